@@ -1,15 +1,19 @@
 """A head and two hands of skin's color in a picture, for the tests of skin and depth."""
 
+from itertools import count
+
 import cv2
 import numpy as np
 
 from voodoo import Camera
+from voodoo.measurements import ColorImage
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 # at the origin of a world whose z points up, looking along x
 POSE = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.2], [0, 0, 0, 1]])
 SKIN, WALL, SHIRT = (120, 150, 205), (150, 140, 130), (160, 70, 40)  # BGR
 Z = 2.5
+_NUMBERS = count()
 
 
 class Pose:
@@ -43,13 +47,18 @@ def picture(head, left, right, *, forearm=None, door=None, light=(1.0, 1.0, 1.0)
     return np.clip(image * np.array(light) + noise, 0, 255).astype(np.uint8)
 
 
+def shown(image, *, camera=CAMERA, pose=POSE):
+    """An image of the camera, 1/30 s after the last one."""
+    return ColorImage("skin", next(_NUMBERS) / 30.0, lambda: image, camera, pose)
+
+
 def learned(skin, frames=8, **parts):
     head, left, right = (160, 60), (110, 120), (210, 120)
     pose = Pose(head, left, right)
     for seed in range(frames):
         image = picture(head, left, right, seed=seed, **parts)
-        skin.observe(image, CAMERA, POSE, pose.joints)
-        skin.learn(image, CAMERA, POSE, pose)
+        skin.observe(shown(image), pose.joints)
+        skin.learn(shown(image), pose)
     return head, left, right
 
 

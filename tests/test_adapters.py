@@ -24,7 +24,7 @@ from voodoo.names import INPUTS
 from voodoo.pipeline.front_end import FrontEnd, FrontEndSettings
 from voodoo.sensors import adapters
 from voodoo.sensors.adapters import Memory, adapter_of, adapters_of
-from voodoo.sensors.kinds import inputs, inputs_of
+from voodoo.sensors.settings import KNOWN
 from voodoo.visualization.overlay import Overlay
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
@@ -42,8 +42,8 @@ def uwb():
 
 
 def test_a_new_sensor_in_one_file_tracks_a_body(uwb):
-    assert inputs() == (*INPUTS, "uwb") and inputs_of("uwb") == ("uwb",)
-    assert FrontEndSettings().use == tuple(kind for kind in inputs() if kind not in ("color", "skin"))
+    assert tuple(KNOWN) == (*INPUTS, "uwb") and KNOWN["uwb"] == "uwb"
+    assert FrontEndSettings().use == tuple(kind for kind in KNOWN if kind not in ("color", "skin"))
     assert uwb.main(frames=40) < 0.06, "no worse than the tags' own noise (mean length 8 cm)"
 
 
@@ -83,10 +83,10 @@ def test_one_adapter_for_a_kind():
         ColorImage("c", 0.0, lambda: np.zeros((3, 4, 3), np.uint8), CAMERA, np.eye(4)),
         MarkerSet("m", 0.0, {}),
     )
-    assert tuple(adapter.kind for item in items for adapter in adapters_of(item)) == INPUTS == inputs()
+    assert tuple(adapter.kind for item in items for adapter in adapters_of(item)) == INPUTS == tuple(KNOWN)
     recorded = ("depth", "points", "scan", "keypoints", "color", "markers")
-    assert tuple(kind for word in recorded for kind in inputs_of(word)) == INPUTS and inputs_of("imu") == ()
-    assert inputs_of("color") == ("skin", "color") and adapter_of(items[4]).kind == "skin"
+    assert set(KNOWN.values()) == set(recorded)
+    assert KNOWN["skin"] == KNOWN["color"] == "color" and adapter_of(items[4]).kind == "skin"
     known = adapter_of(MarkerSet("m", 0.0, {}))
     with pytest.raises(MeasurementError, match="expected a new kind, found 'markers' for MarkerSet"):
         adapters.register(known)

@@ -5,7 +5,6 @@ from hypothesis import strategies as st
 
 from voodoo.errors import CameraError, VoodooError
 from voodoo.model.camera import Camera
-from voodoo.sensors.pixels import normalized
 
 PINHOLE = Camera(width=8, height=6, fx=10.0, fy=12.0, cx=3.5, cy=2.5)
 LENSES = {
@@ -51,7 +50,7 @@ def test_rays_undo_project_to_every_pixel(model):
 def test_single_pixels_and_all_of_them_are_inverted_alike(model):
     camera = lens(model, LENSES[model])
     pixels = np.stack(np.meshgrid(np.arange(64.0), np.arange(48.0)), axis=-1).reshape(-1, 2)
-    alone = np.concatenate([normalized(camera, part) for part in np.array_split(pixels, 100)])
+    alone = np.concatenate([camera.undistorted(part) for part in np.array_split(pixels, 100)])
     np.testing.assert_array_equal(alone.astype(np.float32), camera.rays().reshape(-1, 2))
 
 

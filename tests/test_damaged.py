@@ -159,8 +159,8 @@ def test_messages_that_the_index_announces_and_the_file_lacks_are_counted(entrie
     bag = damage.write(start / "fewer", entries[:120])
     read = BagFolder.messages
 
-    def fewer(self, connections=(), start=None, stop=None):
-        for number, item in enumerate(read(self, connections, start=start, stop=stop)):
+    def fewer(self, connections, start=None):
+        for number, item in enumerate(read(self, connections, start=start)):
             if number == 10:
                 raise OSError("the disk is gone")
             yield item

@@ -181,7 +181,7 @@ def test_a_damaged_color_image_is_refused_when_checked(folder):
         ("1.0\n", "line 1: expected 'stamp file'"),
         ("one depth/a.png\n", "line 1: expected a stamp"),
         ("nan depth/a.png\n", "line 1: expected a stamp"),
-        ("2.0 depth/a.png\n1.0 depth/b.png\n", "stamp after 2.0"),
+        ("2.0 depth/a.png\n1.0 depth/b.png\n", "rising stamps, found 1.000000 after 2.0"),
         ("# nothing\n", "found none"),
     ],
 )

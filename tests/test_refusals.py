@@ -14,7 +14,7 @@ from voodoo.export.track import Track
 from voodoo.model.joint import expectation
 from voodoo.pipeline.inputs import join
 from voodoo.pipeline.start import Init, start_tracker
-from voodoo.recordings import open_recording, sample_path
+from voodoo.recordings import ColorImage, open_recording, sample_path
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.marker_trajectories import read_trc
 from voodoo.recordings.pose2sim import Pose2SimRecording
@@ -39,7 +39,7 @@ def sensor(**changes):
 
 
 def skin(image, camera=CAMERA):
-    SkinTracker().observe(image, camera, HERE, {})
+    SkinTracker().observe(ColorImage("rgb", 0.0, lambda: image, camera, HERE), {})
 
 
 @pytest.mark.parametrize(
@@ -76,7 +76,7 @@ def skin(image, camera=CAMERA):
         (
             lambda: sensor(camera=None),
             MeasurementError,
-            "camera: expected a Camera, the calibration of the image, found",
+            "camera: expected a voodoo.Camera, found",
         ),
         *(
             (
@@ -117,7 +117,7 @@ def skin(image, camera=CAMERA):
             "gate: expected 0 < radius <= widest and growth >= 0, found radius",
         ),
         (lambda: skin([[1]]), MeasurementError, "image: expected an array (H, W, 3) of uint8, found list"),
-        (lambda: skin(np.zeros((24, 32, 3), np.uint8), None), MeasurementError, "camera: expected a Camera"),
+        (lambda: skin(np.zeros((24, 32, 3), np.uint8), None), MeasurementError, "camera: expected a voodoo.Camera"),
         (lambda: DepthFilter().apply([[1, 2]]), MeasurementError, "depth: expected an array (H, W), found list"),
         (
             lambda: DepthFilter().apply(np.zeros((2, 2), np.uint16), meters_per_unit=NAN),
@@ -147,7 +147,7 @@ def skin(image, camera=CAMERA):
             for rate in ("30", 0.0, None)
             for words in ("expected images per second > 0, found ",)
         ),
-        (lambda: read_trc("nowhere.trc"), RecordingError, "nowhere.trc: expected a .trc file, found none"),
+        (lambda: read_trc("nowhere.trc"), RecordingError, "nowhere.trc: expected a .trc file, found no such file"),
     ],
 )
 def test_a_wrong_argument(call, error, words):

@@ -14,7 +14,7 @@ from voodoo.sensors.model import (
     SensorModel,
     stereo_noise,
 )
-from voodoo.sensors.pixels import normalized, ray_distance, world_rays
+from voodoo.sensors.pixels import ray_distance, world_rays
 
 LENS = Camera(640, 480, 500.0, 510.0, 320.5, 239.0, (-0.2, 0.05, 1e-3, -2e-3, 0.0))
 FISHEYE = Camera(640, 480, 300.0, 300.0, 320.0, 240.0, (0.05, -0.01, 0.002, 0.0), "equidistant")
@@ -72,7 +72,7 @@ def test_noise_refuses_nonsense():
 @pytest.mark.parametrize("camera", [LENS, FISHEYE])
 def test_normalized_inverts_the_lens_at_any_subpixel(camera):
     points = np.array([[0.3, -0.2, 2.0], [-0.7, 0.5, 1.9], [0.0, 0.0, 1.0]])
-    np.testing.assert_allclose(normalized(camera, camera.project(points)), points[:, :2] / points[:, 2:], atol=1e-6)
+    np.testing.assert_allclose(camera.undistorted(camera.project(points)), points[:, :2] / points[:, 2:], atol=1e-6)
 
 
 def test_world_rays_pass_through_the_point():

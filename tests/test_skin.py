@@ -9,7 +9,7 @@ import pytest
 import voodoo
 from measurement_data import data_folder
 from scene import rest_pose, turn
-from skin_scene import CAMERA, POSE, SKIN, Pose, Z, at, learned, picture, pixel_error
+from skin_scene import CAMERA, POSE, SKIN, Pose, Z, at, learned, picture, pixel_error, shown
 from voodoo import Config, MeasurementError
 from voodoo.measurements import DepthImage
 from voodoo.pipeline.front_end import FrontEnd
@@ -31,7 +31,7 @@ def test_hands_and_face_are_found_and_named():
     skin = SkinTracker()
     head, left, right = learned(skin)
     moved = ((162, 61), (104, 113), (214, 128))
-    rays = skin.observe(picture(*moved, seed=99), CAMERA, POSE, Pose(head, left, right).joints)
+    rays = skin.observe(shown(picture(*moved, seed=99)), Pose(head, left, right).joints)
     assert {ray.site for ray in rays} == {"head_center", "l_hand", "r_hand"}
     for site, pixel in zip(("head_center", "l_hand", "r_hand"), moved, strict=True):
         assert pixel_error(skin, site, pixel) < 2.0
@@ -47,8 +47,8 @@ def test_a_distorting_lens_is_undistorted():
     skin, depth = SkinTracker(), beside(camera=bent)
     for seed in range(8):
         image = picture(*observed, seed=seed)
-        rays = skin.observe(image, bent, POSE, pose.joints, depth=depth)
-        skin.learn(image, bent, POSE, pose)
+        rays = skin.observe(shown(image, camera=bent), pose.joints, depth=depth)
+        skin.learn(shown(image, camera=bent), pose)
     assert [ray.site for ray in rays] == list(names)
     for ray in rays:  # behind the skin, on the ray through the undistorted pixel
         assert ray_distance(ray.origin, ray.direction, pose.joints[ray.site]) < 0.01
@@ -59,7 +59,7 @@ def test_a_hidden_hand_gets_no_ray_and_the_other_keeps_its_own():
     skin = SkinTracker()
     head, left, right = learned(skin)
     image = picture(head, left, left, seed=5)  # the right hand is not there
-    rays = skin.observe(image, CAMERA, POSE, Pose(head, left, right).joints)
+    rays = skin.observe(shown(image), Pose(head, left, right).joints)
     assert {ray.site for ray in rays} == {"head_center", "l_hand"}
 
 
@@ -69,7 +69,7 @@ def test_a_hand_keeps_its_name_while_the_model_falls_behind():
     joints = Pose(head, left, right).joints  # the model stands still, 20 cm and more from where the hand goes
     for step in range(1, 6):
         moved = (left[0] - 5 * step, left[1] - 5 * step)
-        skin.observe(picture(head, moved, right, seed=step), CAMERA, POSE, joints, depth=beside())
+        skin.observe(shown(picture(head, moved, right, seed=step)), joints, depth=beside())
         assert pixel_error(skin, "l_hand", moved) < 2.0
 
 
@@ -82,10 +82,10 @@ def test_skin_at_another_distance_is_that_of_the_room(units):
     image = (meters if units is np.float32 else 1000.0 * meters).astype(units)
     depth = beside(image=image, meters_per_unit=1.0 if units is np.float32 else 0.001)
     joints = Pose(head, left, right).joints
-    rays = skin.observe(picture(head, left, right, seed=3), CAMERA, POSE, joints, depth=depth)
+    rays = skin.observe(shown(picture(head, left, right, seed=3)), joints, depth=depth)
     assert {ray.site: ray.place is None for ray in rays} == {"head_center": False, "r_hand": False}
     depth.image[:] = 0  # no return: nothing is known of any distance
-    rays = skin.observe(picture(head, left, right, seed=4), CAMERA, POSE, joints, depth=depth)
+    rays = skin.observe(shown(picture(head, left, right, seed=4)), joints, depth=depth)
     assert {ray.site: ray.place is None for ray in rays} == dict.fromkeys(joints, True)
 
 
@@ -99,7 +99,7 @@ def test_a_depth_camera_at_another_place_measures_the_same():
     for away in (Z, Z + 0.25):
         joints = Pose(head, left, right).joints | {"l_hand": at(left, away)}
         depth = beside(np.where(np.arange(320) < 178, away, Z), root_from_sensor=aside)
-        rays = {ray.site: ray for ray in skin.observe(image, CAMERA, POSE, joints, depth=depth)}
+        rays = {ray.site: ray for ray in skin.observe(shown(image), joints, depth=depth)}
         # Behind the surface by 4 cm.
         assert np.linalg.norm(rays["l_hand"].place - at(left, away)) == pytest.approx(0.04, abs=0.01)
 
@@ -117,9 +117,9 @@ def test_what_lies_on_the_trunk_is_no_hand():
         learned(skin)
         joints = Pose(head, left, right).joints
         for seed in range(12):  # long enough to have lost it
-            skin.observe(picture(head, right, right, seed=seed), CAMERA, POSE, joints, depth=beside())
+            skin.observe(shown(picture(head, right, right, seed=seed)), joints, depth=beside())
         image = picture(head, far, right, seed=20)
-        rays = skin.observe(image, CAMERA, POSE, joints, depth=beside(), tracker=tracker)
+        rays = skin.observe(shown(image), joints, depth=beside(), tracker=tracker)
         explained = bool(tracker.distance(at(far, Z)[None])[0] < 0.0)
         found[explained] = {ray.site: ray for ray in rays}
     assert set(found[True]) == {"head_center", "r_hand"}
@@ -136,8 +136,8 @@ def test_a_shirt_behind_one_hand_is_not_learned():
         image = picture(head, left, right, seed=seed)
         cv2.circle(image, left, 30, shirt, -1)
         cv2.circle(image, left, 5, SKIN, -1)
-        skin.observe(image, CAMERA, POSE, pose.joints)
-        skin.learn(image, CAMERA, POSE, pose)
+        skin.observe(shown(image), pose.joints)
+        skin.learn(shown(image), pose)
     assert "l_hand" in skin.assigned and pixel_error(skin, "l_hand", left) < 3.0
 
 
@@ -147,7 +147,7 @@ def test_a_face_pulls_less_at_a_head_that_depth_shows():
     image, joints = picture(head, left, right, seed=9), Pose(head, left, right).joints
     found = {}
     for displayed in ((), ("head_center", "l_hand")):
-        rays = skin.observe(image, CAMERA, POSE, joints, head_visible=displayed)
+        rays = skin.observe(shown(image), joints, head_visible=displayed)
         found[displayed] = {ray.site: ray.bias for ray in rays}
     settings = SkinSettings()
     assert found[()] == dict(settings.sites)
@@ -161,7 +161,7 @@ def test_the_hand_is_the_end_of_a_bare_forearm_that_is_far_from_the_elbow():
     head, left, right = learned(skin, forearm=(135, 160))
     moved, elbow = (105, 115), (133, 157)
     image, joints = picture(head, moved, right, forearm=elbow, seed=7), Pose(head, left, right).joints
-    skin.observe(image, CAMERA, POSE, joints | {"l_elbow": at(elbow)})
+    skin.observe(shown(image), joints | {"l_elbow": at(elbow)})
     assert pixel_error(skin, "l_hand", moved) < 9.0  # 7 cm; the forearm's middle is 25 pixels away
 
 
@@ -172,9 +172,9 @@ def test_a_hand_is_a_forearm_away_from_its_elbow():
     joints = Pose(head, left, right).joints
     joints["l_hand"] = at(left, Z + 0.04)
     image = picture(head, (left[0] + 6, left[1] - 12), right, seed=7)
-    assert {ray.site for ray in skin.observe(image, CAMERA, POSE, joints, depth=beside())} == set(joints)
+    assert {ray.site for ray in skin.observe(shown(image), joints, depth=beside())} == set(joints)
     joints["l_elbow"] = at((left[0] + 12, left[1] - 24), Z + 0.04)  # 23 cm above the hand
-    assert "l_hand" not in {ray.site for ray in skin.observe(image, CAMERA, POSE, joints, depth=beside())}
+    assert "l_hand" not in {ray.site for ray in skin.observe(shown(image), joints, depth=beside())}
 
 
 def test_a_door_of_the_same_color_gives_no_wrong_hand():
@@ -183,7 +183,7 @@ def test_a_door_of_the_same_color_gives_no_wrong_hand():
     head, _, right = learned(skin, frames=60, door=door)
     for seed, hand in enumerate([(100, 125), (60, 150)]):  # near the door, and in front of it
         joints = Pose(head, hand, right).joints
-        for ray in skin.observe(picture(head, hand, right, door=door, seed=seed), CAMERA, POSE, joints):
+        for ray in skin.observe(shown(picture(head, hand, right, door=door, seed=seed)), joints):
             assert pixel_error(skin, ray.site, dict(zip(joints, (head, hand, right), strict=True))[ray.site]) < 4.0
 
 
@@ -195,11 +195,11 @@ def test_the_color_follows_the_light():
     for step in range(120):
         light = (1.0 + 0.004 * step, 1.0, 1.0 - 0.0025 * step)
         image = picture(head, left, right, light=light, seed=step)
-        skin.observe(image, CAMERA, POSE, pose.joints)
-        skin.learn(image, CAMERA, POSE, pose)
+        skin.observe(shown(image), pose.joints)
+        skin.learn(shown(image), pose)
     last = picture(head, left, right, light=light, seed=500)
-    assert len(skin.observe(last, CAMERA, POSE, pose.joints)) == 3
-    assert len(blind.observe(last, CAMERA, POSE, pose.joints)) < 3  # without learning the light has taken the cue away
+    assert len(skin.observe(shown(last), pose.joints)) == 3
+    assert len(blind.observe(shown(last), pose.joints)) < 3  # without learning the light has taken the cue away
 
 
 def test_lost_tracking_teaches_nothing():
@@ -207,7 +207,7 @@ def test_lost_tracking_teaches_nothing():
     pose = Pose((160, 60), (110, 120), (210, 120))
     pose.status = "lost"
     before = skin._cue.colors
-    skin.learn(picture((160, 60), (110, 120), (210, 120)), CAMERA, POSE, pose)
+    skin.learn(shown(picture((160, 60), (110, 120), (210, 120))), pose)
     np.testing.assert_array_equal(before, skin._cue.colors)
     assert not skin._cue.learned
 
@@ -216,7 +216,7 @@ def test_settings_and_images_are_checked():
     with pytest.raises(MeasurementError, match="gate"):
         SkinSettings(gate=0.0)
     with pytest.raises(MeasurementError, match="240, 320"):
-        SkinTracker().observe(np.zeros((10, 10, 3), np.uint8), CAMERA, POSE, {})
+        SkinTracker().observe(shown(np.zeros((10, 10, 3), np.uint8)), {})
 
 
 @pytest.mark.parametrize(
@@ -231,7 +231,7 @@ def test_a_depth_image_is_checked(change, message):
     skin = SkinTracker()
     joints = Pose((160, 60), (110, 120), (210, 120)).joints
     with pytest.raises(MeasurementError, match=message):
-        skin.observe(np.zeros((240, 320, 3), np.uint8), CAMERA, POSE, joints, depth=beside(**change))
+        skin.observe(shown(np.zeros((240, 320, 3), np.uint8)), joints, depth=beside(**change))
 
 
 def test_no_places_and_places_that_are_nowhere_give_nothing():
@@ -244,8 +244,8 @@ def test_no_places_and_places_that_are_nowhere_give_nothing():
         {"l_hand": np.array([-2.0, 0.0, 1.0])},
         {"l_hand": np.full(3, 1e300)},
     ):
-        assert skin.observe(image, CAMERA, POSE, joints, depth=beside()) == []
-    assert len(skin.observe(image, CAMERA, POSE, Pose(head, left, right).joints)) == 3
+        assert skin.observe(shown(image), joints, depth=beside()) == []
+    assert len(skin.observe(shown(image), Pose(head, left, right).joints)) == 3
 
 
 def run(recording, use, solver="chain", frames=30):

@@ -24,7 +24,7 @@ from voodoo.pipeline.starts.markers import MarkersStart
 from voodoo.recordings import open_recording, sample_path
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.sensors.pixels import in_sensor
-from voodoo.sensors.rays import SiteRay, place_of
+from voodoo.sensors.rays import TRUSTED, SiteRay, place_of
 from voodoo.sensors.settings import FrontEndSettings
 
 BODY = voodoo.Body.human(1.75)
@@ -96,7 +96,7 @@ def test_rays_meet_where_most_of_them_agree():
     towards[2] = towards[2] + (0.0, 0.6, 0.0)
     rays = [SiteRay("l_wrist", o, w / np.linalg.norm(w), 0.02, "") for o, w in zip(origins, towards, strict=True)]
     met = place_of(rays)
-    assert np.linalg.norm(met.position - place) < 0.005 and met.visible_in.tolist() == [True, True, False]
+    assert np.linalg.norm(met.position - place) < 0.005 and (met.trust >= TRUSTED).tolist() == [True, True, False]
     assert 0.01 < met.sigma < 0.05
     assert place_of(rays[:1]) is None
     assert place_of([rays[0], rays[0].moved((0.0, 0.01, 0.0))]) is None  # parallel

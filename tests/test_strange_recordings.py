@@ -233,7 +233,7 @@ def test_damaged_images_of_a_folder_are_left_out(tmp_path):
         "that are blank": 1,
         "of another size than calibrated": 1,
     }
-    with pytest.raises(RecordingError, match="expected a stamp after"):
+    with pytest.raises(RecordingError, match="expected rising stamps"):
         open_recording(path)
 
 

@@ -17,6 +17,7 @@ NORMAL = (0.683, 0.954)
 """Fractions within one and two standard deviations of a normal distribution."""
 
 ARM = np.array([name.split("_")[1] in ("shoulder", "elbow", "wrist") for name in metrics.JOINTS])
+_LIMBS = ("arms", "legs")
 TRUNK = np.array([name.split("_")[1] in ("shoulder", "hip") for name in metrics.JOINTS])
 
 
@@ -37,8 +38,7 @@ class Deviations:
 
 def sigma_of(estimate: Estimate) -> FloatArray:
     """Standard deviations (12, 3) [m] of metrics.JOINTS; NaN where unknown."""
-    unknown = np.full(3, np.nan)
-    return np.array([estimate.joint_sigma.get(name, unknown) for name in metrics.JOINTS], dtype=np.float64)
+    return np.array([estimate.joint_sigma.get(name, (np.nan,) * 3) for name in metrics.JOINTS], dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -86,43 +86,41 @@ def calibrate(found: Sequence[Deviations]) -> UncertaintyCalibration | None:
     """Compare errors with their standard deviations; None if no joint has both."""
     if not found:
         return None
-    errors, sigma, measured, known = together(found)
-    if not known.any():
+    grouped = groups(found)
+    size, total = (np.linalg.norm(values, axis=1) for values in grouped["all joints"])
+    if not len(size):
         return None
-    coverages = [
-        _coverage(name, errors[chosen & known], sigma[chosen & known])
-        for name, chosen in (
-            ("all joints", np.ones_like(known)),
-            ("shoulders and hips", np.broadcast_to(TRUNK, known.shape)),
-            ("ends of measured limbs", ~TRUNK & measured),
-            ("ends of other limbs", ~TRUNK & ~measured),
-        )
-    ]
-    quartiles = []
-    for limbs, chosen in (("arms", ARM), ("legs", ~ARM)):
-        own = known & chosen
-        order = np.argsort(sigma[own].ravel(), kind="stable")
-        parts = zip(("surest", "second", "third", "least sure"), np.array_split(order, 4), strict=True)
-        quartiles += [
-            _coverage(f"{limbs}, {word} quarter", errors[own].ravel()[part], sigma[own].ravel()[part])
-            for word, part in parts
-        ]
-    size, total = (np.linalg.norm(values[known], axis=1) for values in (errors, sigma))
+    quarters = ("surest", "second", "third", "least sure")
     kept = len(size) - int(DROPPED * len(size))
     return UncertaintyCalibration(
-        coverages=tuple(coverages),
-        quartiles=tuple(quartiles),
+        coverages=tuple(_coverage(name, *of_group) for name, of_group in grouped.items() if name not in _LIMBS),
+        quartiles=tuple(
+            _coverage(f"{limbs}, {word} quarter", *part)
+            for limbs in _LIMBS
+            for word, part in zip(quarters, by_sigma(*grouped[limbs], parts=4), strict=True)
+        ),
         mean_m=float(size.mean()),
         kept_m=float(size[np.argsort(total, kind="stable")[:kept]].mean()),
         oracle_m=float(np.sort(size)[:kept].mean()),
     )
 
 
-def together(found: Sequence[Deviations]) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray]:
-    """Errors, standard deviations, whether the limb is measured, and which joints (F, 12) have both."""
-    errors, sigma = (np.concatenate([getattr(each, name) for each in found]) for name in ("errors", "sigma"))
+def groups(found: Sequence[Deviations]) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Errors and standard deviations (N, 3) of groups of joints that have both."""
+    errors, sigma, measured = (
+        np.concatenate([getattr(each, name) for each in found]) for name in ("errors", "sigma", "measured")
+    )
     known = np.isfinite(errors).all(axis=2) & np.isfinite(sigma).all(axis=2)
-    return errors, sigma, np.concatenate([each.measured for each in found]), known
+    ends = known & ~TRUNK
+    chosen = {"all joints": known, "shoulders and hips": known & TRUNK, "ends of measured limbs": ends & measured}
+    chosen |= {"ends of other limbs": ends & ~measured, "arms": known & ARM, "legs": known & ~ARM}
+    return {name: (errors[own], sigma[own]) for name, own in chosen.items()}
+
+
+def by_sigma(errors: FloatArray, sigma: FloatArray, *, parts: int) -> list[tuple[FloatArray, FloatArray]]:
+    """Errors and standard deviations by coordinate in equal parts, those with the smallest standard deviations first."""
+    order = np.argsort(sigma.ravel(), kind="stable")
+    return [(errors.ravel()[part], sigma.ravel()[part]) for part in np.array_split(order, parts)]
 
 
 def _coverage(name: str, errors: FloatArray, sigma: FloatArray) -> Coverage:

@@ -21,28 +21,25 @@ from voodoo.evaluation.metrics import BoolArray, FloatArray, fraction_within, me
 from voodoo.measurements import DepthImage, PointCloud, RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.projection import CameraView, body_mask, limb_rings, transform
+from voodoo.recordings.keypoint_layouts import of_both_sides
 from voodoo.sensors.depth import depth_points
+from voodoo.sensors.settings import within_boxes
 from voodoo.tracker import Tracker
 
 Selection: TypeAlias = Literal["segmented", "truth", "model"]
 
-CAPSULES: tuple[tuple[str, str, float], ...] = (
-    ("humanoid_root", "vc7", 0.20),
-    ("l_hip", "r_hip", 0.19),
-    ("l_shoulder", "r_shoulder", 0.15),
-    ("vc7", "skull_tip", 0.15),
-    *(
-        (f"{side}_{start}", f"{side}_{end}", radius)
-        for side in ("l", "r")
-        for start, end, radius in (
-            ("shoulder", "elbow", 0.11),
-            ("elbow", "wrist", 0.09),
-            ("wrist", "hand", 0.11),
-            ("hip", "knee", 0.16),
-            ("knee", "ankle", 0.11),
-        )
-    ),
-)
+CAPSULES: dict[tuple[str, str], float] = {
+    ("humanoid_root", "vc7"): 0.20,
+    ("l_hip", "r_hip"): 0.19,
+    ("l_shoulder", "r_shoulder"): 0.15,
+    ("vc7", "skull_tip"): 0.15,
+} | of_both_sides({
+    ("shoulder", "elbow"): 0.11,
+    ("elbow", "wrist"): 0.09,
+    ("wrist", "hand"): 0.11,
+    ("hip", "knee"): 0.16,
+    ("knee", "ankle"): 0.11,
+})  # fmt: skip
 """Segments between true joints and the radius [m] within which points belong to the person. Large enough for a heavy person
 in clothes, small enough that at the ankles (8 cm above the floor) only a few square decimeters of floor are included."""
 
@@ -96,7 +93,7 @@ def witness(
         else:
             continue
         near = near_joints(points, truth)
-        inside = np.ones(len(points), dtype=bool) if box is None else _in_box(points, *box)
+        inside = np.ones(len(points), dtype=bool) if box is None else within_boxes(points, [box])
         chosen = near if selection == "truth" else inside
         person = np.zeros(len(valid), dtype=bool)
         person[valid] = chosen
@@ -114,7 +111,7 @@ def near_joints(points: FloatArray, joints: Mapping[str, FloatArray]) -> BoolArr
     near = np.zeros(len(points), dtype=bool)
     if not known:
         return near
-    inside = _in_box(points, *_around(known))  # most pixels are far from all persons
+    inside = within_boxes(points, [_around(known)])  # most pixels are far from all persons
     starts, ends, radii = map(np.array, zip(*known, strict=True))
     axes, about = ends - starts, points[inside].T
     lengths = np.maximum((axes**2).sum(axis=1), 1e-12)[:, None]
@@ -129,7 +126,7 @@ def near_joints(points: FloatArray, joints: Mapping[str, FloatArray]) -> BoolArr
 def _capsules(joints: Mapping[str, FloatArray]) -> list[tuple[FloatArray, FloatArray, float]]:
     return [
         (joints[start], joints[end], radius)
-        for start, end, radius in CAPSULES
+        for (start, end), radius in CAPSULES.items()
         if start in joints and end in joints and np.isfinite([joints[start], joints[end]]).all()
     ]
 
@@ -138,11 +135,6 @@ def _around(capsules: Sequence[tuple[FloatArray, FloatArray, float]]) -> tuple[F
     low = np.min([np.minimum(a, b) - radius for a, b, radius in capsules], axis=0)
     high = np.max([np.maximum(a, b) + radius for a, b, radius in capsules], axis=0)
     return low, high
-
-
-def _in_box(points: FloatArray, low: FloatArray, high: FloatArray) -> BoolArray:
-    x, y, z = ((points[:, axis] >= low[axis]) & (points[:, axis] <= high[axis]) for axis in range(3))
-    return np.asarray(x & y & z)
 
 
 def _box(

@@ -220,8 +220,8 @@ def _score(
     without = metrics.without_offsets(positions, compared)
     class_without, _ = metrics.tracking_class(np.where(missed, NOWHERE_M, without), stamps, limit=limit)
     still = metrics.standing_still(reference, stamps)
-    distances = np.concatenate([one.distances for one in seen])
-    about_joints = np.concatenate([one.about_joints for one in seen])
+    distances, about = (np.concatenate([getattr(one, name) for one in seen]) for name in ("distances", "about_joints"))
+    left_out = float(1.0 - np.isfinite(reference).sum() / np.isfinite(whole).sum()) if exact is False else np.nan
     angle_error, angle_spread = metrics.angle_error(positions, compared)
     first_wait, first_error = _first_pose(stamps, status, whole, errors0)
     far, near = (limb_ends(errors, far=which) for which in (True, False))
@@ -248,7 +248,7 @@ def _score(
         depth_within_5cm=metrics.fraction_within(distances, 0.05),
         depth_median_m=float(np.median(distances)) if distances.size else np.nan,
         depth_p95_m=float(np.percentile(distances, 95.0)) if distances.size else np.nan,
-        person_within_5cm=metrics.fraction_within(distances[about_joints], 0.05),
+        person_within_5cm=metrics.fraction_within(distances[about], 0.05),
         silhouette_iou=metrics.mean_or_nan(overlaps),
         jitter_m=metrics.jitter(positions),
         reference_jitter_m=metrics.jitter(reference),
@@ -264,9 +264,7 @@ def _score(
         step_s=float(seconds.mean()),
         angle_error_deg=angle_error,
         angle_spread_deg=angle_spread,
-        left_out_share=float(1.0 - np.isfinite(reference).sum() / np.isfinite(whole).sum())
-        if exact is False
-        else np.nan,
+        left_out_share=left_out,
     )
     deviations = None if exact is None else Deviations(positions - compared, sigma, measured)
     return score, FrameTable(stamps, status, errors, lost, within, overlaps, seconds, deviations)

@@ -202,14 +202,12 @@ def tracking_class(errors: FloatArray, stamps: FloatArray, *, limit: float) -> t
         frame, None if nothing is known; and a mask (F, J) of lost joints.
     """
     known = np.isfinite(errors)
-    lost = np.zeros(errors.shape, dtype=bool)
-    at_end = False
-    for joint in range(errors.shape[1]):
-        lost[:, joint] = lost_frames(errors[:, joint] > limit, known[:, joint], stamps)
-        observed = np.flatnonzero(known[:, joint])
-        at_end |= len(observed) > 0 and bool(lost[observed[-1], joint])
+    lost = np.column_stack(
+        [lost_frames(*of_joint, stamps) for of_joint in zip((errors > limit).T, known.T, strict=True)]
+    )
     if not known.any():
         return None, lost
+    at_end = any(gone[seen][-1] for gone, seen in zip(lost.T, known.T, strict=True) if seen.any())
     return (0 if at_end else 1 if lost.any() else 2), lost
 
 
@@ -255,11 +253,17 @@ def standing_still(reference: FloatArray, stamps: FloatArray) -> BoolArray:
 
 def fraction_within(distances: FloatArray, limit: float) -> float:
     """Fraction of the known distances that are at most `limit`; NaN if none is known."""
-    known = distances[np.isfinite(distances)]
-    return float(np.mean(known <= limit)) if known.size else float("nan")
+    return mean_or_nan((distances[np.isfinite(distances)] <= limit).astype(np.float64))
 
 
 def mean_or_nan(values: FloatArray) -> float:
     """Mean of the known values; NaN if none is known."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if known.size else float("nan")
+
+
+def weighted(scores: Sequence[object], name: str, weight: str) -> float:
+    """Mean of an attribute of scores where it is known, by another attribute as its weight; NaN without weight."""
+    parts = [(getattr(one, name), getattr(one, weight)) for one in scores if np.isfinite(getattr(one, name))]
+    total = sum(part[1] for part in parts)
+    return float(sum(value * number for value, number in parts) / total) if total else float("nan")

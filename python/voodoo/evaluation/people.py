@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -34,6 +34,13 @@ ABSENT_S = 2.0
 SAME_TIME_S = 0.01
 """Largest difference of the stamps of truth and result in one frame [s]."""
 ROOT = "humanoid_root"
+RULES = (
+    f"A match is a root within {MATCH_M:g} m of a person with {IN_VIEW:g} or more of their pixels in view; who is less in view "
+    f"may be followed or not. MOTA, IDF1 and switches are those of py-motmetrics. First pose: from {JOINTS_IN_VIEW:g} in view "
+    f"on. Return: after more than {ABSENT_S:g} s out of view. A false body is a stretch of an id that matches nobody; one that "
+    f"follows on a match of this id is left behind. Joints count from {JOINTS_IN_VIEW:g} in view on."
+)
+"""Explains a table of scores."""
 _NEVER = 1e6
 _LAST = 10.0
 
@@ -112,10 +119,12 @@ class PeopleScore:
 
 @dataclass(frozen=True, eq=False)
 class Matches:
-    """Matches of persons and ids in each of F frames.
+    """Matches of persons and ids in each of F frames, which are those of truth and result.
 
     Args:
         stamps: (F,) [s].
+        truth: (F,) row of the truth, -1 without.
+        rows: F lists of rows of the result.
         ids: I ids of the result, increasing.
         of_person: (F, P) index of the id matched with a person, -1 without.
         of_id: (F, I) index of the person, -1 without a match, -2 without a pose, -3 at a person who is not expected.
@@ -123,6 +132,8 @@ class Matches:
     """
 
     stamps: FloatArray
+    truth: npt.NDArray[np.int64]
+    rows: list[npt.NDArray[np.int64]]
     ids: npt.NDArray[np.int64]
     of_person: npt.NDArray[np.int64]
     of_id: npt.NDArray[np.int64]
@@ -134,7 +145,7 @@ NOBODY, NO_POSE, ASIDE = -1, -2, -3
 
 
 def score(
-    name: str, path: Path, truth: PeopleTruth, rows: Arrays, *, seconds: float | None = None, step_s: float = np.nan
+    name: str, path: Path, truth: PeopleTruth, rows: Arrays, *, seconds: float, step_s: float = np.nan
 ) -> PeopleScore:
     """Evaluate a result.
 
@@ -142,22 +153,20 @@ def score(
         name, path: of the recording.
         truth: in the result's root frame.
         rows: the result: `stamps` (R,), `person` (R,), `joint_names` (J,) and `joints` (R, J, 3), NaN without a pose.
-        seconds: duration of the recording; None: from the first to the last stamp of truth and result.
+        seconds: duration of the recording.
         step_s: mean time of a frame.
 
     Raises:
         VoodooError: no stamp of the result is in the truth, or py-motmetrics is not installed.
     """
-    frames = _frames(truth, rows)
-    found = match(truth, rows, frames)
+    found = match(truth, rows)
     waits, visits, returns, returned = _visits(truth, found)
     false_bodies, left_behind = _false_bodies(found)
-    errors = _joint_errors(truth, rows, frames, found)
-    span = float(frames.stamps[-1] - frames.stamps[0]) if len(frames.stamps) else 0.0
+    errors = _joint_errors(truth, rows, found)
     return PeopleScore(
         name,
         path,
-        seconds=span if seconds is None else seconds,
+        seconds=seconds,
         persons=len(truth.persons),
         ids=len(found.ids),
         expected=int(found.counts["num_objects"]),
@@ -181,16 +190,11 @@ def score(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Frames:
-    """F frames of truth and result: stamps (F,), the truth's row of each (-1 without), the result's rows of each."""
-
-    stamps: FloatArray
-    truth: npt.NDArray[np.int64]
-    rows: list[npt.NDArray[np.int64]]
+_Indices: TypeAlias = npt.NDArray[np.int64]
 
 
-def _frames(truth: PeopleTruth, rows: Arrays) -> _Frames:
+def _frames(truth: PeopleTruth, rows: Arrays) -> tuple[FloatArray, _Indices, list[_Indices]]:
+    """Stamps, the truth's row and the result's rows of each frame, see Matches."""
     own, row = np.unique(rows["stamps"], return_inverse=True)
     near = np.clip(np.searchsorted(truth.stamps, own - SAME_TIME_S), 0, len(truth.stamps) - 1)
     same = np.abs(truth.stamps[near] - own) <= SAME_TIME_S
@@ -205,20 +209,20 @@ def _frames(truth: PeopleTruth, rows: Arrays) -> _Frames:
     frame_of = np.where(same, near, len(truth.stamps) - 1 + np.cumsum(~same))
     order = np.argsort(stamps, kind="stable")
     row_frame = np.argsort(order)[frame_of[row]]
-    return _Frames(stamps[order], of_truth[order], [np.flatnonzero(row_frame == index) for index in range(len(stamps))])
+    return stamps[order], of_truth[order], [np.flatnonzero(row_frame == index) for index in range(len(stamps))]
 
 
-def match(truth: PeopleTruth, rows: Arrays, frames: _Frames) -> Matches:
+def match(truth: PeopleTruth, rows: Arrays) -> Matches:
     """Match persons and ids frame by frame, jointly for all persons and keeping the pairs of the previous frame."""
-    mm = motmetrics()
+    mm, (stamps, of_truth, of_result) = motmetrics(), _frames(truth, rows)
     roots = truth.of(ROOT)
     own = metrics.places_of(rows["joint_names"].tolist(), rows["joints"], (ROOT,))[:, 0]
     posed = np.asarray(np.isfinite(own).all(axis=1))
     ids = np.unique(rows["person"][posed])
-    of_person = np.full((len(frames.stamps), len(truth.persons)), NOBODY, dtype=np.int64)
-    of_id = np.full((len(frames.stamps), len(ids)), NO_POSE, dtype=np.int64)
+    of_person = np.full((len(stamps), len(truth.persons)), NOBODY, dtype=np.int64)
+    of_id = np.full((len(stamps), len(ids)), NO_POSE, dtype=np.int64)
     judge = mm.MOTAccumulator()
-    for index, (place, there) in enumerate(zip(frames.truth, frames.rows, strict=True)):
+    for index, (place, there) in enumerate(zip(of_truth, of_result, strict=True)):
         there = there[posed[there]]
         in_view = np.zeros(len(truth.persons)) if place < 0 else truth.in_view[place]
         away = np.full((len(truth.persons), len(there)), np.nan)
@@ -238,7 +242,7 @@ def match(truth: PeopleTruth, rows: Arrays, frames: _Frames) -> Matches:
     names = ["num_objects", "num_misses", "num_false_positives", "num_switches", "idtp", "idfp", "idfn"]
     found = mm.metrics.create().compute(judge, metrics=names, return_dataframe=False)
     counts = {name: 0.0 if np.isnan(found[name]) else float(found[name]) for name in names}
-    return Matches(frames.stamps, ids, of_person, of_id, counts)
+    return Matches(stamps, of_truth, of_result, ids, of_person, of_id, counts)
 
 
 def _at_others(away: FloatArray, expected: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
@@ -288,15 +292,15 @@ def _false_bodies(found: Matches) -> tuple[int, int]:
     return appeared, left
 
 
-def _joint_errors(truth: PeopleTruth, rows: Arrays, frames: _Frames, found: Matches) -> FloatArray:
+def _joint_errors(truth: PeopleTruth, rows: Arrays, found: Matches) -> FloatArray:
     """Distances (N, 12) [m] of metrics.JOINTS in all matches of persons who are in view."""
     truth_positions = np.stack([truth.of(name) for name in metrics.JOINTS], axis=2)
     own = metrics.places_of(rows["joint_names"].tolist(), rows["joints"])
     pairs = []
     for index, person in np.argwhere(found.of_person >= 0):
-        place = frames.truth[index]
+        place = found.truth[index]
         if truth.in_view[place, person] >= JOINTS_IN_VIEW:
-            there = frames.rows[index]
+            there = found.rows[index]
             row = there[rows["person"][there] == found.ids[found.of_person[index, person]]][0]
             pairs.append(np.linalg.norm(own[row] - truth_positions[place, person], axis=1))
     return np.array(pairs) if pairs else np.empty((0, len(metrics.JOINTS)))
@@ -316,19 +320,13 @@ def together(scores: Sequence[PeopleScore]) -> PeopleScore:
     good = [one for one in scores if not one.failure]
     counted = [field.name for field in fields(PeopleScore) if field.default == 0]
     sums = {name: sum(getattr(one, name) for one in good) for name in counted}
-
-    def mean(name: str, weight: str) -> float:
-        parts = [(getattr(one, name), getattr(one, weight)) for one in good if np.isfinite(getattr(one, name))]
-        total = sum(part[1] for part in parts)
-        return float(sum(value * count for value, count in parts) / total) if total else float("nan")
-
     worst = [one.worst_first_pose_s for one in good if np.isfinite(one.worst_first_pose_s)]
     return PeopleScore(
         "together",
         Path(),
         **sums,
-        first_pose_s=mean("first_pose_s", "visits_matched"),
+        first_pose_s=metrics.weighted(good, "first_pose_s", "visits_matched"),
         worst_first_pose_s=max(worst, default=np.nan),
-        joint_error_m=mean("joint_error_m", "joints"),
-        step_s=mean("step_s", "seconds"),
+        joint_error_m=metrics.weighted(good, "joint_error_m", "joints"),
+        step_s=metrics.weighted(good, "step_s", "seconds"),
     )

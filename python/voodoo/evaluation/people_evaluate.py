@@ -9,26 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from voodoo.config import Config
 from voodoo.errors import RecordingError, VoodooError
-from voodoo.evaluation.people import (
-    ABSENT_S,
-    IN_VIEW,
-    JOINTS_IN_VIEW,
-    MATCH_M,
-    PeopleScore,
-    motmetrics,
-    score,
-    together,
-)
+from voodoo.evaluation.people import RULES, PeopleScore, motmetrics, score, together
 from voodoo.evaluation.score import RATIO, written
-from voodoo.evaluation.summary import write_table
+from voodoo.evaluation.summary import table_head, table_row, table_text
 from voodoo.export.people import PeopleTrack
 from voodoo.export.table import Arrays, opened_result
-from voodoo.model.body import Body
-from voodoo.names import Automatic, HumanModel
+from voodoo.names import Automatic
 from voodoo.people import People
 from voodoo.pipeline.run import track
+from voodoo.pipeline.start import start_people
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.people_truth import PeopleTruth
 from voodoo.recordings.recording import Recording
@@ -101,27 +91,25 @@ def judge(recording: Recording, people: People, *, settings: FrontEndSettings | 
 def evaluate_people(
     path: Path,
     *,
-    config: Config | None = None,
     options: Mapping[str, Any] | None = None,
-    model: HumanModel | None = None,
     use: Sequence[str] | None = None,
     init: Automatic | None = None,
+    **how: Any,  # noqa: ANN401 - of start_people
 ) -> tuple[PeopleScore, None]:
     """Track all persons in a recording and evaluate the result; without a table of frames.
 
     Args:
         path: of a recording with truth_people.csv beside it.
-        config: None means the defaults.
         options: see open_recording.
-        model: model of the human; None: that of `voodoo.People`.
         use: kinds of inputs; None: all.
         init: of no effect, since persons are always searched for.
+        **how: config and model, see start_people.
 
     Raises:
         VoodooError: it cannot be read, or a frame was refused.
     """
     recording = open_recording(path, **(options or {}))
-    people = People(None if model is None else Body.human(model=model), config=config)
+    people = start_people(recording, use=use, **how)
     return judge(recording, people, settings=FrontEndSettings.of(recording, use=use)), None
 
 
@@ -141,22 +129,11 @@ DERIVED = ("mota", "idf1", "false_a_minute")
 
 def people_markdown(scores: Sequence[PeopleScore]) -> str:
     """A table with a row per recording, and one for all together."""
-    lines = [
-        "## Several people, against exact truth\n",
-        _row([name for name, _ in _COLUMNS]),
-        "|" + "---|" * len(_COLUMNS),
-    ]
+    lines = ["## Several people, against exact truth\n", *table_head(name for name, _ in _COLUMNS)]
     lines += [_line(score) for score in scores]
     if len([score for score in scores if not score.failure]) > 1:
         lines.append(_line(together(scores)))
-    lines.append(
-        f"\nA match is a root within {MATCH_M:g} m of a person with {IN_VIEW:g} or more of their pixels in view; who is less in "
-        f"view may be followed or not. MOTA, IDF1 and switches are those of py-motmetrics. First pose: from "
-        f"{JOINTS_IN_VIEW:g} in view on. Return: after more than {ABSENT_S:g} s out of view. A false body is a stretch of an id "
-        "that matches nobody; one that follows on a match of this id is left behind. Joints count from "
-        f"{JOINTS_IN_VIEW:g} in view on.\n"
-    )
-    return "\n".join(lines)
+    return "\n".join([*lines, f"\n{RULES}\n"])
 
 
 def write_people(folder: Path, scores: Sequence[PeopleScore]) -> list[Path]:
@@ -168,19 +145,15 @@ def write_people(folder: Path, scores: Sequence[PeopleScore]) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     table, text = folder / "people.csv", folder / "people.md"
     names = [*(item.name for item in fields(PeopleScore)), *DERIVED]
-    write_table(table, names, ([getattr(score, name) for name in names] for score in scores))
+    write_whole(table, table_text(names, ([getattr(score, name) for name in names] for score in scores)))
     write_whole(text, people_markdown(scores))
     return [table, text]
 
 
 def _line(score: PeopleScore) -> str:
     if score.failure:
-        return _row((score.name, score.failure.replace("|", "/"), *[""] * (len(_COLUMNS) - 2)))
-    return _row([cell(score) for _, cell in _COLUMNS])
-
-
-def _row(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cells) + " |"
+        return table_row((score.name, score.failure.replace("|", "/"), *[""] * (len(_COLUMNS) - 2)))
+    return table_row(cell(score) for _, cell in _COLUMNS)
 
 
 def _first_pose(score: PeopleScore) -> str:

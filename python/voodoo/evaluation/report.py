@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,18 +11,9 @@ import numpy as np
 
 from voodoo.errors import installed
 from voodoo.evaluation import metrics
-from voodoo.evaluation.calibration import ARM, TRUNK, Deviations, calibrate, calibration_markdown, together
+from voodoo.evaluation.calibration import Deviations, by_sigma, calibrate, calibration_markdown, groups
 from voodoo.evaluation.score import CM, LIMIT_EXACT_M, LIMIT_REFERENCE_M, PERCENT, RATIO, FrameTable, Score, written
-from voodoo.evaluation.summary import (
-    ALL_ROWS,
-    CLASSES,
-    KINDS,
-    Summary,
-    summarize,
-    write_frames,
-    write_sequences,
-    write_summary,
-)
+from voodoo.evaluation.summary import ALL_ROWS, CLASSES, KINDS, Summary, summarize, table_head, table_row, write_tables
 from voodoo.whole import appearing_whole, write_whole
 
 
@@ -65,9 +55,8 @@ def markdown(scores: Sequence[Score], tables: Sequence[FrameTable | None] = ()) 
             written(score.within_10cm, (100.0, ".0f", " %")), written(score.depth_within_5cm, PERCENT),
             written(score.silhouette_iou, RATIO), ", ".join(score.lost_joints) or "none",
         ]  # fmt: skip
-        text.append("| " + " | ".join(cells) + " |")
-    text += [f"\n{score.name}: {' '.join(score.failure.split())}" for score in scores if score.failure]
-    return "\n".join(text) + "\n"
+        text.append(table_row(cells))
+    return "\n".join([*text, *_failures(scores)]) + "\n"
 
 
 _BRIEF = (
@@ -79,12 +68,11 @@ _BRIEF = (
 
 def _head(summary: Summary) -> list[str]:
     """The heading of a table, and its first row."""
-    zero, one, two = summary.classes
     return [
         f"## Against {summary.kind}: {summary.sequences} sequence{'s' * (summary.sequences > 1)}\n",
         "| | |",
         "|---|---|",
-        f"| class 0 / 1 / 2 (K06 Table I) | {zero} / {one} / {two} |",
+        f"| class 0 / 1 / 2 (K06 Table I) | {' / '.join(map(str, summary.classes))} |",
     ]
 
 
@@ -100,8 +88,11 @@ def brief(scores: Sequence[Score]) -> str:
         if summary.sequences:
             text += _head(summary)
             text += _rows(summary, _BRIEF)
-    text += [f"\n{score.name}: {' '.join(score.failure.split())}" for score in scores if score.failure]
-    return "\n".join(text)
+    return "\n".join([*text, *_failures(scores)])
+
+
+def _failures(scores: Sequence[Score]) -> list[str]:
+    return [f"\n{score.name}: {' '.join(score.failure.split())}" for score in scores if score.failure]
 
 
 def deviations_of(scores: Sequence[Score], tables: Sequence[FrameTable | None]) -> dict[str, list[Deviations]]:
@@ -122,17 +113,8 @@ def write_reports(
     Raises:
         OSError: a file cannot be written.
     """
-    (folder / "frames").mkdir(parents=True, exist_ok=True)
-    names: Counter[str] = Counter()
-    for score, table in zip(scores, tables, strict=True):
-        names[score.name] += 1
-        again = f"~{names[score.name]}" if names[score.name] > 1 else ""
-        if table is not None:
-            write_frames(folder / "frames" / f"{score.name}{again}.csv", table)
-    files = [folder / name for name in ("sequences.csv", "summary.csv", "summary.md")]
-    write_sequences(files[0], scores)
-    write_summary(files[1], summarize(scores))
-    write_whole(files[2], markdown(scores, tables))
+    files = [*write_tables(folder, scores, tables), folder / "summary.md"]
+    write_whole(files[-1], markdown(scores, tables))
     if picture:
         files.append(folder / "errors.png")
         plot_errors(files[-1], scores)
@@ -145,12 +127,10 @@ def write_reports(
 
 def _joint_table(scores: Sequence[Score]) -> list[str]:
     names = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
-    lines = ["| mean error, cm | " + " | ".join(names) + " |", "|---|" + "---|" * len(names)]
+    lines = table_head(("mean error, cm", *names))
     for side, word in (("l", "left"), ("r", "right")):
-        means = [
-            metrics.mean_or_nan(np.array([score.joint_error_m[f"{side}_{name}"] for score in scores])) for name in names
-        ]
-        lines.append(f"| {word} | " + " | ".join(written(mean, (100.0, ".1f", "")) for mean in means) + " |")
+        errors = (np.array([score.joint_error_m[f"{side}_{name}"] for score in scores]) for name in names)
+        lines.append(table_row((word, *(written(metrics.mean_or_nan(each), (100.0, ".1f", "")) for each in errors))))
     return [*lines, ""]
 
 
@@ -205,32 +185,25 @@ def plot_errors(path: Path, scores: Sequence[Score]) -> None:
 
 def plot_calibration(path: Path, found: Sequence[Deviations]) -> None:
     """Plot the cumulative distribution of normalized errors, and error over standard deviation."""
-    errors, sigma, measured, known = together(found)
+    grouped = groups(found)
     figure = new_figure(9.6, 4.2)
     left, right = figure.subplots(1, 2)
     steps = np.linspace(0.0, 4.0, 81)
     normal = [math.erf(step / math.sqrt(2.0)) for step in steps]
     left.plot(steps, normal, color="#333333", linestyle="--", linewidth=1.0, label="normal distribution")
-    groups = (
-        ("shoulders and hips", np.broadcast_to(TRUNK, known.shape), "#7a8ca3"),
-        ("measured limbs", ~TRUNK & measured, "#4c8c6b"),
-        ("other limbs", ~TRUNK & ~measured, "#c8553d"),
-    )
-    for name, chosen, color in groups:
-        own = known & chosen
-        if own.any():
-            ratios = np.sort((np.abs(errors[own]) / sigma[own]).ravel())
+    colors = {"shoulders and hips": "#7a8ca3", "ends of measured limbs": "#4c8c6b", "ends of other limbs": "#c8553d"}
+    for name, color in colors.items():
+        errors, sigma = grouped[name]
+        if errors.size:
+            ratios = np.sort((np.abs(errors) / sigma).ravel())
             left.plot(steps, np.searchsorted(ratios, steps, side="right") / ratios.size, color=color, label=name)
     left.set_xlabel("standard deviations")
     left.set_ylabel("share of errors within")
     left.legend(frameon=False, fontsize=8)
-    for name, chosen, color in (("arms", ARM, "#c87f3d"), ("legs", ~ARM, "#3d6fc8")):
-        own = known & chosen
-        if own.any():
-            order = np.argsort(sigma[own].ravel(), kind="stable")
-            bins = np.array_split(order, 20)
-            x = [100 * float(np.sqrt(np.mean(sigma[own].ravel()[part] ** 2))) for part in bins if part.size]
-            y = [100 * float(np.sqrt(np.mean(errors[own].ravel()[part] ** 2))) for part in bins if part.size]
+    for name, color in (("arms", "#c87f3d"), ("legs", "#3d6fc8")):
+        bins = [part for part in by_sigma(*grouped[name], parts=20) if part[0].size]
+        y, x = ([100 * float(np.sqrt(np.mean(part[each] ** 2))) for part in bins] for each in (0, 1))
+        if bins:
             right.plot(x, y, "o-", color=color, label=name, markersize=4)
     reach = [0.5, 20.0]
     right.plot(reach, reach, color="#333333", linestyle="--", linewidth=1.0)

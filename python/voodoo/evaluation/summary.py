@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -13,7 +14,7 @@ import numpy as np
 
 from voodoo.evaluation import metrics
 from voodoo.evaluation.score import PERCENT, Form, FrameTable, Score
-from voodoo.whole import appearing_whole
+from voodoo.whole import write_whole
 
 CLASSES = (0, 1, 2)
 KINDS = {True: "exact truth", False: "reference skeleton", None: "no reference"}
@@ -66,7 +67,7 @@ def summarize(scores: Sequence[Score]) -> list[Summary]:
             lags = [score.best_lag for score in done if score.best_lag is not None]
             counts = [sum(score.tracking_class == value for score in done) for value in CLASSES]
             means = {name: metrics.mean_or_nan(np.array([getattr(s, name) for s in done] or [np.nan])) for name in ROWS}
-            means |= {f"{name}_together": _together(done, name, count) for name, count in TOGETHER.items()}
+            means |= {f"{name}_together": metrics.weighted(done, name, count) for name, count in TOGETHER.items()}
             summaries.append(
                 Summary(
                     kind=kind if done else "not tracked",
@@ -80,13 +81,6 @@ def summarize(scores: Sequence[Score]) -> list[Summary]:
     return summaries
 
 
-def _together(scores: Sequence[Score], name: str, count: str) -> float:
-    """Fraction over all sequences, weighted by their totals; NaN if these are zero."""
-    counts = [(getattr(score, name), getattr(score, count)) for score in scores if getattr(score, count) > 0]
-    total = sum(number for _, number in counts)
-    return sum(fraction * number for fraction, number in counts) / total if total else math.nan
-
-
 def table_text(header: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
     """Rows of values as CSV; unknown ones are empty cells."""
     text = io.StringIO()
@@ -96,10 +90,15 @@ def table_text(header: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
     return text.getvalue()
 
 
-def write_table(path: Path, header: Sequence[str], rows: Iterable[Iterable[object]]) -> None:
-    """Write `table_text`, which appears when it is complete."""
-    with appearing_whole(path) as part:
-        part.write_text(table_text(header, rows), encoding="utf-8")
+def table_row(cells: Iterable[str]) -> str:
+    """A row of a table in Markdown."""
+    return f"| {' | '.join(cells)} |"
+
+
+def table_head(names: Iterable[str]) -> list[str]:
+    """The first two rows of a table in Markdown."""
+    row = table_row(names)
+    return [row, "|" + "---|" * (row.count("|") - 1)]
 
 
 def cell(value: object) -> str:
@@ -107,6 +106,25 @@ def cell(value: object) -> str:
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return ""
     return f"{value:.6f}" if isinstance(value, float) else str(value)
+
+
+def write_tables(folder: Path, scores: Sequence[Score], tables: Sequence[FrameTable | None]) -> list[Path]:
+    """Write sequences.csv and summary.csv, which are returned, and frames/NAME.csv, see `voodoo.evaluation.report.write_reports`.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    (folder / "frames").mkdir(parents=True, exist_ok=True)
+    names: Counter[str] = Counter()
+    for score, table in zip(scores, tables, strict=True):
+        names[score.name] += 1
+        again = f"~{names[score.name]}" if names[score.name] > 1 else ""
+        if table is not None:
+            write_frames(folder / "frames" / f"{score.name}{again}.csv", table)
+    files = [folder / "sequences.csv", folder / "summary.csv"]
+    write_sequences(files[0], scores)
+    write_summary(files[1], summarize(scores))
+    return files
 
 
 def write_sequences(path: Path, scores: Sequence[Score]) -> None:
@@ -119,7 +137,7 @@ def write_sequences(path: Path, scores: Sequence[Score]) -> None:
         + [score.selection, " ".join(score.lost_joints), score.path]
         for score in scores
     )
-    write_table(path, header, rows)
+    write_whole(path, table_text(header, rows))
 
 
 def write_summary(path: Path, summaries: Sequence[Summary]) -> None:
@@ -136,25 +154,17 @@ def write_summary(path: Path, summaries: Sequence[Summary]) -> None:
         ]
         for one in summaries
     )
-    write_table(path, [*own, *ALL_ROWS], rows)
+    write_whole(path, table_text([*own, *ALL_ROWS], rows))
 
 
 def write_frames(path: Path, table: FrameTable) -> None:
     """A row for each frame of a recording."""
     header = ["stamp_s", "status", "mean_error_m", *(f"{name}_error_m" for name in metrics.JOINTS)]
-    header += ["lost_joints", "depth_within_5cm", "silhouette_iou", "step_s"]
+    numbers = ("depth_within_5cm", "silhouette_iou", "step_s")
     lost = [" ".join(np.array(metrics.JOINTS)[flags]) for flags in table.lost]
-    columns = (
-        table.stamps,
-        table.status,
-        table.errors,
-        lost,
-        table.depth_within_5cm,
-        table.silhouette_iou,
-        table.step_s,
-    )
+    columns = (table.stamps, table.status, table.errors, lost, *(getattr(table, name) for name in numbers))
     rows = (
         [repr(float(stamp)), status, metrics.mean_or_nan(errors), *errors, *last]
         for stamp, status, errors, *last in zip(*columns, strict=True)
     )
-    write_table(path, header, rows)
+    write_whole(path, table_text([*header, "lost_joints", *numbers], rows))

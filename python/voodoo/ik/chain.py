@@ -120,15 +120,10 @@ class Chain:
             BodyError: a site or limb in the wrong role: bones must be on the chain, `others` must not.
             MeasurementError: an invalid number; it names the argument.
         """
-        Options(margin=margin, thin=thin)  # rejects the same values as `solve`
-        views = core_views(images)
+        _, depths = Options(margin=margin, thin=thin).of_images()
+        views, known = core_views(images), listed_poses(others)
         return self.core.criterion(
-            base_pose(world_from_base),
-            vector(angles),
-            listed_bones(bones),
-            (margin, thin),
-            views,
-            listed_poses(others),
+            base_pose(world_from_base), vector(angles), listed_bones(bones), depths, views, known
         )
 
     def __repr__(self) -> str:

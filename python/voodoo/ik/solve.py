@@ -18,12 +18,10 @@ from voodoo.ik.values import (
     Options,
     Target,
     Targets,
-    base_pose,
     chosen_options,
-    listed_bones,
-    listed_poses,
     named,
     numbers,
+    solved,
     target_parts,
     vector,
 )
@@ -168,17 +166,9 @@ def solve(
     options = chosen_options(options, changes)
     views = core_views(images)
     begin = start.angles if isinstance(start, Posture) else chain.rest() if start is None else start
-    angles, sites, (h, steps, _, _, converged), poses, residuals = chain.core.solve(
-        base_pose(world_from_base),
-        vector(begin)[np.newaxis],
-        target_parts(targets),
-        None,
-        listed_bones(options.bones),
-        (options.margin, options.thin),
-        views,
-        listed_poses(others),
-        options.parts(),
-        rest_parts(chain, rest),
+    known = world_from_base, views, others
+    angles, sites, (h, steps, _, _, converged), poses, residuals = solved(
+        chain.core, vector(begin)[np.newaxis], target_parts(targets), None, *known, options, rest_parts(chain, rest)
     )
     return Posture(
         angles=angles[0],
@@ -232,18 +222,9 @@ def solve_many(
         raise MeasurementError(f"starts: expected finite numbers ({n},) or (N, {n}), found shape {begin.shape}")
     begin = np.ascontiguousarray(np.broadcast_to(begin, (len(places), n)))
     goals = [Target.at(site, (0.0, 0.0, 0.0)).parts() for site in sites]
-    views = core_views(images)
-    angles, joints, (h, steps, tried, compared, converged), *_ = chain.core.solve(
-        base_pose(world_from_base),
-        begin,
-        goals,
-        places,
-        listed_bones(options.bones),
-        (options.margin, options.thin),
-        views,
-        [],
-        options.parts(),
-        rest_parts(chain, rest),
+    known = world_from_base, core_views(images), None
+    angles, joints, (h, steps, tried, compared, converged), *_ = solved(
+        chain.core, begin, goals, places, *known, options, rest_parts(chain, rest)
     )
     return Postures(angles, joints, h, steps, tried, compared, converged != 0.0)
 

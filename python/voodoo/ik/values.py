@@ -11,6 +11,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+import voodoo._core as _core
 from voodoo.errors import MeasurementError
 from voodoo.model.joint import numbers_of, short
 
@@ -89,14 +90,13 @@ def numbers(what: str, values: npt.ArrayLike) -> FloatArray:
     return numbers_of(what, values, MeasurementError)
 
 
-def three(what: str, values: Vector) -> tuple[float, float, float]:
-    """Three numbers.
+def three(what: str, values: Vector) -> FloatArray:
+    """Three finite numbers.
 
     Raises:
         MeasurementError: it names `what`.
     """
-    x, y, z = numbers_of(what, values, MeasurementError, "three numbers", count=3).tolist()
-    return x, y, z
+    return numbers_of(what, values, MeasurementError, "three finite numbers", count=3)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,8 +151,12 @@ class Options:
                 raise MeasurementError(f"{name}: expected {low:g} to {high:g}, found {value!r}")
         listed_bones(self.bones)
 
+    def of_images(self) -> tuple[list[Bone] | None, tuple[float, float]]:
+        """The options of the image criterion as the core takes them."""
+        return listed_bones(self.bones), (self.margin, self.thin)
+
     def parts(self) -> tuple[int, float, float, float, float, float]:
-        """The options as the core takes them."""
+        """The options of the steps as the core takes them."""
         return (self.steps, self.tolerance, self.still, self.gain, self.caution, self.largest_turn)
 
 
@@ -218,7 +222,7 @@ class Target:
         Raises:
             MeasurementError: not three finite numbers, or a weight that is not above zero.
         """
-        x, y, z = three(f"target {site}: position", position)
+        x, y, z = three(f"target {site}: position", position).tolist()
         return cls(site, "position", (x, y, z, 0.0, 0.0, 0.0), weight, priority)
 
     @classmethod
@@ -228,12 +232,11 @@ class Target:
         Raises:
             MeasurementError: not three finite numbers, no direction, or a weight that is not above zero.
         """
-        o = np.array(three(f"target {site}: origin", origin))
-        n = np.array(three(f"target {site}: direction", direction))
+        o, n = three(f"target {site}: origin", origin), three(f"target {site}: direction", direction)
         length = float(np.linalg.norm(n))
         if not 1e-12 < length < math.inf:
             raise MeasurementError(f"target {site}: direction: expected a vector other than zero, found {direction!r}")
-        n /= length
+        n = n / length
         a, b, c, d, e, f = (float(value) for value in np.concatenate([n, np.cross(o, n)]))
         return cls(site, "line", (a, b, c, d, e, f), weight, priority)
 
@@ -256,3 +259,24 @@ def target_parts(targets: Targets) -> list[TargetParts]:
     if not isinstance(targets, Sequence) or not all(isinstance(target, Target) for target in targets):
         raise MeasurementError(f"targets: expected site -> position (3,), or a list of Target, found {short(targets)}")
     return [target.parts() for target in targets]
+
+
+def solved(
+    chain: _core.Chain,
+    starts: FloatArray,
+    goals: Sequence[TargetParts],
+    positions: FloatArray | None,
+    world_from_base: npt.ArrayLike | None,
+    views: Sequence[_core.View],
+    others: Mapping[str, npt.ArrayLike] | None,
+    options: Options,
+    rest: Sequence[tuple[int, float]],
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, tuple[float, ...]]:
+    """What the core finds from starts (N, n): angles, sites, numbers, poses and residuals; see `voodoo.ik.solve`.
+
+    Raises:
+        BodyError: a site or limb that is not on the chain, or one of `others` that is on it.
+        MeasurementError: an invalid number.
+    """
+    base, known = base_pose(world_from_base), listed_poses(others)
+    return chain.solve(base, starts, goals, positions, *options.of_images(), views, known, options.parts(), rest)

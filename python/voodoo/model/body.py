@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -177,9 +176,7 @@ def checked_joints(
         raise BodyError(f"{what}: expected a mapping of names to positions, found {type(joints).__name__}")
     checked = {}
     for name, position in joints.items():
-        x, y, z = numbers_of(f"{what}[{name}]", position, BodyError, "three numbers in meters", count=3).tolist()
-        if not all(map(math.isfinite, (x, y, z))):
-            raise BodyError(f"{what}[{name}]: expected finite meters, found {short(position)}")
+        x, y, z = numbers_of(f"{what}[{name}]", position, BodyError, "three finite meters", count=3).tolist()
         checked[name] = (x, y, z)
     return checked
 

@@ -152,8 +152,13 @@ class Camera:
     def undistorted(self, pixels: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Normalized coordinates x/z, y/z (N, 2) of pixels (N, 2) at any subpixel position, lens distortion removed.
 
-        NaN where the lens model has no direction, see `rays`. The shape is not checked, see voodoo.sensors.pixels.normalized.
+        NaN where the lens model has no direction, see `rays`.
+
+        Raises:
+            CameraError: the shape is not (N, 2).
         """
+        if pixels.ndim != 2 or pixels.shape[1] != 2:
+            raise CameraError(f"pixels: expected shape (N, 2), found {pixels.shape}")
         return self.core.undistorted(np.ascontiguousarray(pixels, dtype=np.float64))
 
     @cached_property

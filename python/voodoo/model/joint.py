@@ -197,13 +197,15 @@ def numbers_of(
     *,
     count: int | None = None,
 ) -> npt.NDArray[np.float64]:
-    """An array of real numbers given by the caller; with a `count`, so many of them in a row.
+    """An array of real numbers given by the caller; with a `count`, so many finite ones in a row.
 
     Raises:
         VoodooError: of the class `error`, for other values; names `what`.
     """
     try:
         found = as_numbers(values)
+        if count is not None and not np.isfinite(found).all():
+            raise ValueError("not finite")
         return found if count is None else found.reshape((count,))
     except (TypeError, ValueError, OverflowError):
         raise error(f"{what}: expected {expected}, found {short(values)}") from None

@@ -46,7 +46,7 @@ class FrozenSensors:
         for item in sorted(measurements, key=idle):
             if idle(item) and not repeats:
                 continue
-            content = _content(item, use)
+            content = next((one.content(item) for one in adapters_of(item) if one.kind in use), None)
             if content is None:
                 continue
             before = self._contents.get(item.sensor)
@@ -60,13 +60,6 @@ class FrozenSensors:
         if not stuck:
             return list(measurements)
         return [item for item in measurements if not any(item is other for other in stuck)]
-
-
-def _content(item: Measurement, use: Sequence[str]) -> npt.NDArray[Any] | None:
-    for adapter in adapters_of(item):
-        if adapter.kind in use:
-            return adapter.content(item)
-    return None
 
 
 def unchanged(before: npt.NDArray[Any], content: npt.NDArray[Any]) -> bool:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Literal, NamedTuple, TypeAlias
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +19,7 @@ from voodoo.ik.values import Options
 from voodoo.measurements import ByteImage, ColorImage, DepthImage, FloatArray, RecordedFrame
 from voodoo.recordings.recording import Recording, Reference
 from voodoo.sensors.settings import LEVEL_FRAMES
-from voodoo.sensors.silhouettes.masks import surroundings
+from voodoo.sensors.silhouettes.masks import Mask, surroundings
 from voodoo.sensors.silhouettes.regions import RegionSilhouettes
 from voodoo.sensors.silhouettes.still import StillBackground, StillScene, from_depth
 from voodoo.tracker import Tracker
@@ -110,13 +111,12 @@ def follow(
     known = [name for name in sites if name in there]
     if not known:
         raise VoodooError(f"sites: expected some of {', '.join(positions.names)}, found {', '.join(sites)}")
-    scenes = {} if pictures in ("none", "regions") else _scenes(recording, positions, known, pictures)
+    masks = {} if pictures in ("none", "regions") else _masks(recording, positions, known, pictures)
     regions = RegionSilhouettes(tracker.body) if pictures == "regions" else None
     options = Options() if options is None else options
     start = chain.project(tracker.estimate.world_from_limb)
     follower = Follower(chain, start=start, rest="mean" if rest else None, **vars(options))
     others = [name for name in there if name not in known]
-    level = recording.root_frame in LEVEL_FRAMES
 
     def solved() -> Iterator[Solved]:
         near: FloatArray | Posture = start
@@ -126,7 +126,7 @@ def follow(
             began = time.perf_counter()
             targets = positions.at(recorded.stamp, known, within=_SAME_TIME_S)
             observed = {**last, **targets} if warm else targets
-            images = _silhouettes(recorded, observed, scenes, level=level) if targets else []
+            images = _silhouettes(recorded, observed, masks) if targets else []
             colors = [item for item in recorded.measurements if isinstance(item, ColorImage)] if regions else []
             if regions is not None and targets:
                 # The first frame is the one whose posture is known.
@@ -168,31 +168,24 @@ def _track(stamp: float, posture: Posture) -> Track:
     )
 
 
+_MaskOf: TypeAlias = Callable[[Any, Mapping[str, FloatArray]], Mask]
+"""The mask of an image, by current and previous positions (3,) [m] of the person's sites."""
+
+
 def _silhouettes(
-    recorded: RecordedFrame,
-    sites: Mapping[str, FloatArray],
-    scenes: Mapping[str, StillScene | StillBackground],
-    *,
-    level: bool,
+    recorded: RecordedFrame, sites: Mapping[str, FloatArray], masks: Mapping[str, _MaskOf]
 ) -> list[Silhouette]:
-    """Silhouettes of all images whose scene is known; `sites`: current and previous positions (3,) [m] of the person."""
-    found = []
-    for item in recorded.measurements:
-        scene = scenes.get(item.sensor)
-        if isinstance(item, DepthImage) and isinstance(scene, StillScene):
-            mask = from_depth(item, sites, scene=scene, level=level)
-        elif isinstance(item, ColorImage) and isinstance(scene, StillBackground):
-            mask = scene.mask(item.image)
-        else:
-            continue
-        found.append(Silhouette(mask, camera=item.camera, world_from_camera=item.root_from_sensor))
-    return found
+    """Silhouettes of all images whose scene is known."""
+    return [
+        Silhouette(masks[item.sensor](item, sites), camera=item.camera, world_from_camera=item.root_from_sensor)
+        for item in recorded.measurements
+        if isinstance(item, DepthImage | ColorImage) and item.sensor in masks
+    ]
 
 
-def _scenes(
-    recording: Recording, positions: Reference, known: Sequence[str], pictures: Pictures
-) -> dict[str, StillScene | StillBackground]:
-    """Background image of each camera, from images spread over the recording; cameras are assumed to be static."""
+def _masks(recording: Recording, positions: Reference, known: Sequence[str], pictures: Pictures) -> dict[str, _MaskOf]:
+    """Of each camera what tells the person from its scene, which is learned from images spread over the recording; cameras are
+    assumed to be static."""
     chosen = set(np.linspace(0, len(recording) - 1, _LEARN).round().astype(int).tolist())
     depths: dict[str, list[DepthImage]] = {}
     colors: dict[str, list[tuple[ByteImage, npt.NDArray[np.bool_]]]] = {}
@@ -209,7 +202,15 @@ def _scenes(
                 colors.setdefault(item.sensor, []).append((item.image, there))
     if not depths and not colors:
         raise VoodooError(f"{recording.name}: expected {pictures} pictures, found none; --pictures says where to look")
-    scenes: dict[str, StillScene | StillBackground] = {name: StillScene(images) for name, images in depths.items()}
+    level = recording.root_frame in LEVEL_FRAMES
+    masks: dict[str, _MaskOf] = {
+        name: partial(from_depth, scene=StillScene(images), level=level) for name, images in depths.items()
+    }
     for name, pairs in colors.items():
-        scenes[name] = StillBackground([image for image, _ in pairs], occupied=[there for _, there in pairs])
-    return scenes
+        background = StillBackground([image for image, _ in pairs], occupied=[there for _, there in pairs])
+        masks[name] = partial(_before, background)
+    return masks
+
+
+def _before(background: StillBackground, item: ColorImage, _: Mapping[str, FloatArray]) -> Mask:
+    return background.mask(item.image)

@@ -57,7 +57,7 @@ class Ros1File(Reader):
         """Read nothing yet."""
         super().__init__(path)
         self._unpacking = unpacking
-        self._last: tuple[int, bytes | Exception] = (-1, b"")
+        self._last: tuple[int, bytes | RecordingError] = (-1, b"")
         self._size, self._indexed = path.stat().st_size, 0
 
     def read_index_data(self, pos: int, indexes: dict[int, list[IndexData]]) -> None:
@@ -75,9 +75,7 @@ class Ros1File(Reader):
         start, end = self.start_time, self.end_time
         return ReaderMetadata(max(end - start, 0), start, end, self.message_count, None, None, None, None)
 
-    def messages(  # type: ignore[override]
-        self, connections: Collection[Connection] = (), start: int | None = None, stop: int | None = None
-    ) -> Iterator[Item]:
+    def messages(self, connections: Collection[Connection], start: int | None = None) -> Iterator[Item]:  # type: ignore[override]
         """See bag_file."""
         first = -1 if start is None else start
         entries = [(entry, one) for one in connections for entry in self.indexes[one.id] if first <= entry.time]
@@ -90,12 +88,10 @@ class Ros1File(Reader):
 
     def _message(self, entry: IndexData) -> bytes:
         if self._last[0] != entry.chunk_pos:
-            try:
-                self._last = entry.chunk_pos, self._content(entry.chunk_pos)
-            except Exception as error:  # told for each of its messages
-                self._last = entry.chunk_pos, error
+            read, sound = partial(self._content, entry.chunk_pos), f"a sound chunk at byte {entry.chunk_pos}"
+            self._last = entry.chunk_pos, or_error(read, self.path, sound)
         content = self._last[1]
-        if isinstance(content, Exception):
+        if isinstance(content, RecordingError):  # told for each of its messages
             raise content
         chunk = io.BytesIO(content)
         chunk.seek(entry.offset)
@@ -125,8 +121,7 @@ class BagFolder(DirectoryReader):
         """Read nothing yet."""
         super().__init__(path)
         self._folder, self._unpacking = path, unpacking
-        plugins: Any = {"mcap": partial(McapFile, unpacking=unpacking), "sqlite3": SqliteFile}
-        self.STORAGE_PLUGINS = plugins
+        self.STORAGE_PLUGINS: Any = {"mcap": partial(McapFile, unpacking=unpacking), "sqlite3": SqliteFile}
 
     def open(self) -> None:
         """Check metadata.yaml and the size of the files, and read the index of each."""
@@ -147,14 +142,12 @@ class BagFolder(DirectoryReader):
         if len(set(names)) != len(names):
             raise RecordingError(f"{yaml}: expected every file once, found {', '.join(sorted(names))[:300]}")
 
-    def messages(  # type: ignore[override]
-        self, connections: Collection[Connection], start: int | None = None, stop: int | None = None
-    ) -> Iterator[Item]:
+    def messages(self, connections: Collection[Connection], start: int | None = None) -> Iterator[Item]:  # type: ignore[override]
         """Messages in the order of the files."""
         wanted = {(item.topic, item.msgtype): item for item in connections}
         for storage in self.storages:
             own = [item for item in storage.connections if (item.topic, item.msgtype) in wanted]
-            found: Iterator[Any] = storage.messages(own, start, stop) if own else iter(())
+            found: Iterator[Any] = storage.messages(own, start) if own else iter(())
             for item, time, data in found:
                 if self.metadata.compression_mode == "message" and isinstance(data, bytes):
                     unpack = partial(self._unpacking.unpack, data, "zstd")

@@ -54,10 +54,7 @@ def read_camera_toml(path: str | Path, *, meters_per_unit: float = 1.0) -> tuple
     Raises:
         RecordingError: not TOML or YAML, no camera, or a missing or invalid key; names the camera.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise RecordingError(f"{path}: expected a calibration file, found none")
-    tables = tables_of(path)
+    tables = tables_of(Path(path))
     if not tables:
         raise RecordingError(f"{path}: expected a table with a matrix for each camera, found none")
     return tuple(_placed(f"{path}, [{key}]", key, table, meters_per_unit) for key, table in tables.items())
@@ -275,9 +272,8 @@ def read_calibration(path: Path, *, like: Path | None = None) -> FolderCalibrati
         hint = f"Write {path} with the numbers of the camera:\n\n{template(like)}"
         raise RecordingError(f"{path}: expected a calibration file beside the images, found none", hint=hint)
     content = parse_toml(read_text(path, error=RecordingError), source=str(path), error=RecordingError)
-    with valid(
-        path, RecordingError, known=(*_Placed.model_fields, "outside [color] depth_factor", "root_frame", "color")
-    ):
+    known = (*_Placed.model_fields, "outside [color] depth_factor", "root_frame", "color")
+    with valid(path, RecordingError, known=known):
         found = _Calibration.model_validate(content)
     depth = found.placed("depth", str(path))
     color = None if found.color is None else found.color.placed("color", f"{path}, [color]")

@@ -12,13 +12,13 @@ from pathlib import Path, PurePath
 import numpy as np
 
 from voodoo.errors import RecordingError
-from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
+from voodoo.measurements import ByteImage, ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.recordings.camera_files import FolderCalibration, PlacedCamera, read_calibration
 from voodoo.recordings.left_out import LeftOut, leave_out
 from voodoo.recordings.order import numbers_of
 from voodoo.recordings.pictures import decode_color, decode_depth_png
 from voodoo.recordings.recording import Recording, SensorInfo, number_option, usable
-from voodoo.recordings.set_back import SetBack
+from voodoo.recordings.set_back import SetBack, out_of_order
 from voodoo.recordings.together import in_turn
 from voodoo.recordings.truth import read_beside
 from voodoo.stored import read_stored, read_stored_text
@@ -96,9 +96,8 @@ class FolderRecording(Recording):
         self.path = path
         self.name = path.resolve().name
         self._left_out = left_out
-        clock = FrameClock(
-            None if rate is None else number_option(path, "rate", rate, "images per second > 0", most=1e4)
-        )
+        rate = None if rate is None else number_option(path, "rate", rate, "images per second > 0", most=1e4)
+        clock = FrameClock(rate)
         set_back = SetBack()
         self._depth = _listing(path, "depth", DEPTH_SUFFIXES, clock, left_out, set_back)
         if not self._depth:
@@ -207,9 +206,7 @@ def _listing(
         moved = written if left_out is None else set_back.of(name, written)
         stamp = written if moved is None else moved
         if number and (moved is None or stamp <= rising[-1][0]):
-            reason = "with a repeated stamp" if stamp == rising[-1][0] else "with a stamp before the last one"
-            expected = f"{file}: expected a stamp after {rising[-1][0]:.6f}, found {stamp:.6f}"
-            leave_out(left_out, RecordingError(expected, reason=reason))
+            leave_out(left_out, out_of_order(file, stamp, rising[-1][0]))
         elif number:
             rising.append((stamp, file))
     return rising
@@ -236,23 +233,22 @@ def _stamp(text: str, where: str) -> float:
     return stamp
 
 
-def _read(file: Path) -> bytes:
-    return read_stored(file, "a readable picture")
-
-
 def depth_image(stamp: float, file: Path, calibration: FolderCalibration) -> DepthImage:
     """The image in a file of depth/."""
     place = calibration.depth
-    image = decode_depth_png(_read(file), file, (place.camera.width, place.camera.height))
+    content = read_stored(file, "a readable picture")
+    image = decode_depth_png(content, file, (place.camera.width, place.camera.height))
     image = np.ascontiguousarray(image[:, ::-1]) if place.mirrored else image
     return DepthImage("depth", stamp, image, 1.0 / calibration.depth_factor, place.camera, place.world_from_sensor)
 
 
 def color_image(stamp: float, file: Path, color: PlacedCamera) -> ColorImage:
     """The image in a file of rgb/, which is read when it is decoded."""
-    size = (color.camera.width, color.camera.height)
-    step = -1 if color.mirrored else 1
-    load = partial(lambda f, s: np.ascontiguousarray(decode_color(_read(f), f, s)[:, ::step]), file, size)
+
+    def load() -> ByteImage:
+        image = decode_color(read_stored(file, "a readable picture"), file, (color.camera.width, color.camera.height))
+        return np.ascontiguousarray(image[:, :: -1 if color.mirrored else 1])
+
     return ColorImage("rgb", stamp, load, color.camera, color.world_from_sensor)
 
 

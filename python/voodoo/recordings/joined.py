@@ -113,22 +113,18 @@ class _Ahead:
     """Reads the measurements of a recording in step with time."""
 
     def __init__(self, recording: Recording, offset: float) -> None:
-        self._frames = iter(recording)
-        self._offset = offset
-        self._held: RecordedFrame | None = None
+        self._frames, self._offset = iter(recording), offset
+        self._next = next(self._frames, None)
 
     def until(self, stamp: float) -> tuple[Measurement, ...]:
         """Measurements since the last call, up to `stamp`: the last of each sensor."""
         found: tuple[Measurement, ...] = ()
-        while True:
-            held = self._held if self._held is not None else next(self._frames, None)
-            if held is None or held.stamp + self._offset > stamp + 1e-6:
-                self._held = held
-                return found
-            self._held = None
-            moved = tuple(replace(item, stamp=item.stamp + self._offset) for item in held.measurements)
+        while self._next is not None and self._next.stamp + self._offset <= stamp + 1e-6:
+            moved = tuple(replace(item, stamp=item.stamp + self._offset) for item in self._next.measurements)
             latest = {item.sensor for item in moved}
             found = tuple(item for item in found if item.sensor not in latest) + moved
+            self._next = next(self._frames, None)
+        return found
 
 
 class WithKeypoints(Around):

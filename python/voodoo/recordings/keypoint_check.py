@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import combinations, permutations
+from itertools import combinations, islice, permutations
 from typing import TypeAlias, TypeVar
 
 import numpy as np
@@ -78,14 +78,8 @@ def some_of(places: Sequence[S], read: Callable[[S], T], *, good: Callable[[T], 
     """A few good items, spread over their places; all are read only if few are good."""
     count = len(places)
     step = max(count // _INSTANTS, 1)
-    found = []
-    for index in dict.fromkeys((*range(step // 2, count, step), *range(count))):
-        item = read(places[index])
-        if good(item):
-            found.append(item)
-        if len(found) == _INSTANTS:
-            break
-    return found
+    items = (read(places[index]) for index in dict.fromkeys((*range(step // 2, count, step), *range(count))))
+    return list(islice(filter(good, items), _INSTANTS))
 
 
 def check_keypoints(where: object, instants: Sequence[Instant]) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from voodoo.errors import MeasurementError
 
@@ -20,7 +20,13 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-_JOINT_SPREAD = {"shoulder": 0.03, "elbow": 0.02, "wrist": 0.02, "hip": 0.04, "knee": 0.02, "ankle": 0.02, "toe": 0.05}
+T = TypeVar("T")
+
+_SPREADS = {
+    "shoulder": 0.03, "elbow": 0.02, "wrist": 0.02, "hip": 0.04, "knee": 0.02, "ankle": 0.02, "toe": 0.05,
+    "head_center": 0.06, "skullbase": 0.05, "skull_tip": 0.05, "vc7": 0.05, "humanoid_root": 0.04, "l_hand": 0.02, "r_hand": 0.02,
+}  # fmt: skip
+"""Spread of a site [m]; the joints of both sides come first, in the order in which most networks have them."""
 
 
 @dataclass(frozen=True)
@@ -44,90 +50,65 @@ class Layout:
     midpoints: tuple[tuple[int, int, int], ...] = ()
 
 
-def _pairs(*indices: tuple[int, int], names: Iterable[str] = _JOINT_SPREAD) -> list[SiteKeypoints]:
-    """Joints of both sides, by their keypoints on the left and on the right; the names may be more."""
-    return [
-        SiteKeypoints(prefix + name, {pair[side]: 1.0}, _JOINT_SPREAD[name])
+def _layout(
+    count: int,
+    *pairs: tuple[int, int],
+    names: Iterable[str] = _SPREADS,
+    midpoints: tuple[tuple[int, int, int], ...] = (),
+    **others: Mapping[int, float],
+) -> Layout:
+    """A layout, by the keypoints of each joint on the left and on the right, and those of other sites with their weights.
+
+    There may be more names than joints.
+    """
+    joints = [
+        SiteKeypoints(prefix + name, {pair[side]: 1.0}, _SPREADS[name])
         for side, prefix in enumerate(("l_", "r_"))
-        for name, pair in zip(names, indices, strict=False)
+        for name, pair in zip(names, pairs, strict=False)
     ]
-
-
-def _ears(left: int, right: int) -> SiteKeypoints:
-    # The midpoint of the ears is the center of the head from every direction.
-    return SiteKeypoints("head_center", {left: 0.5, right: 0.5}, 0.06)
-
-
-def _palm(side: str, wrist: int, little: int, index: int) -> SiteKeypoints:
-    # The palm's center lies between the wrist and the knuckles of the little and the index finger.
-    return SiteKeypoints(f"{side}_hand", {wrist: 0.4, little: 0.3, index: 0.3}, 0.02)
+    sites = [SiteKeypoints(site, weights, _SPREADS[site]) for site, weights in others.items()]
+    return Layout(count, (*joints, *sites), midpoints)
 
 
 _LEGS_FIRST = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
 _COCO = ((5, 6), (7, 8), (9, 10), (11, 12), (13, 14), (15, 16))
+_COCO_EARS = {3: 0.5, 4: 0.5}
+"""The midpoint of the ears is the center of the head from every direction."""
 
 LAYOUTS: dict[str, Layout] = {
     # nose, eyes, ears (3, 4), then pairs from the shoulders to the ankles
-    "coco17": Layout(17, (*_pairs(*_COCO), _ears(3, 4))),
+    "coco17": _layout(17, *_COCO, head_center=_COCO_EARS),
     # OpenPose: its neck (1) and mid-hip (8) are computed from the shoulders and hips
-    "body25": Layout(
-        25,
-        (
-            *_pairs((5, 2), (6, 3), (7, 4), (12, 9), (13, 10), (14, 11), (19, 22)),
-            _ears(18, 17),
-        ),
-        midpoints=((1, 2, 5), (8, 9, 12)),
+    "body25": _layout(
+        25, (5, 2), (6, 3), (7, 4), (12, 9), (13, 10), (14, 11), (19, 22),
+        head_center={18: 0.5, 17: 0.5}, midpoints=((1, 2, 5), (8, 9, 12)),
     ),
     # OpenPose BODY_25B: COCO, then upper neck (17) and head top (18) of MPII, then feet
-    "body25b": Layout(
-        25,
-        (
-            *_pairs(*_COCO, (19, 22)),
-            _ears(3, 4),
-            SiteKeypoints("skullbase", {17: 1.0}, 0.05),
-            SiteKeypoints("skull_tip", {18: 1.0}, 0.05),
-        ),
-    ),
-    # MediaPipe: 33 landmarks; ears 7 and 8; knuckles of little and index finger from 17
-    "blazepose33": Layout(
-        33,
-        (
-            *_pairs((11, 12), (13, 14), (15, 16), (23, 24), (25, 26), (27, 28), (31, 32)),
-            _ears(7, 8),
-            _palm("l", 15, 17, 19),
-            _palm("r", 16, 18, 20),
-        ),
+    "body25b": _layout(25, *_COCO, (19, 22), head_center=_COCO_EARS, skullbase={17: 1.0}, skull_tip={18: 1.0}),
+    # MediaPipe: 33 landmarks; ears 7 and 8; the palm's center lies between the wrist and the knuckles of the little finger
+    # (17, 18) and the index finger (19, 20)
+    "blazepose33": _layout(
+        33, (11, 12), (13, 14), (15, 16), (23, 24), (25, 26), (27, 28), (31, 32), head_center={7: 0.5, 8: 0.5},
+        l_hand={15: 0.4, 17: 0.3, 19: 0.3}, r_hand={16: 0.4, 18: 0.3, 20: 0.3},
     ),
     # COCO, then top of the head (17), neck (18), hip (19), and feet in pairs from the big toes (20, 21)
-    "halpe26": Layout(
-        26,
-        (
-            *_pairs(*_COCO, (20, 21)),
-            _ears(3, 4),
-            SiteKeypoints("skull_tip", {17: 1.0}, 0.05),
-            SiteKeypoints("vc7", {18: 1.0}, 0.05),
-        ),
-    ),
+    "halpe26": _layout(26, *_COCO, (20, 21), head_center=_COCO_EARS, skull_tip={17: 1.0}, vc7={18: 1.0}),
     # pelvis, right leg, left leg, spine, thorax (8), nose (9), top of the head (10), left arm, right arm
-    "h36m17": Layout(
-        17,
-        (
-            *_pairs((4, 1), (5, 2), (6, 3), (11, 14), (12, 15), (13, 16), names=_LEGS_FIRST),
-            SiteKeypoints("humanoid_root", {0: 1.0}, 0.04),
-            SiteKeypoints("vc7", {8: 1.0}, 0.05),
-            SiteKeypoints("skull_tip", {10: 1.0}, 0.05),
-        ),
-        midpoints=((0, 1, 4), (8, 11, 14)),
+    "h36m17": _layout(
+        17, (4, 1), (5, 2), (6, 3), (11, 14), (12, 15), (13, 16), names=_LEGS_FIRST,
+        humanoid_root={0: 1.0}, vc7={8: 1.0}, skull_tip={10: 1.0}, midpoints=((0, 1, 4), (8, 11, 14)),
     ),
-}
+}  # fmt: skip
 """Layout by name."""
 
-LIMBS = tuple(
-    (f"{side}_{above}", f"{side}_{below}")
-    for side in "lr"
-    for chain in (("shoulder", "elbow", "wrist"), ("shoulder", "hip", "knee", "ankle"))
-    for above, below in pairwise(chain)
-)
+
+def of_both_sides(table: Mapping[tuple[str, str], T]) -> dict[tuple[str, str], T]:
+    """A table of pairs of sites, for the left side and then for the right one."""
+    return {(f"{side}_{one}", f"{side}_{other}"): value for side in "lr" for (one, other), value in table.items()}
+
+
+_CHAINS = (("shoulder", "elbow", "wrist"), ("shoulder", "hip", "knee", "ankle"))
+LIMBS = tuple(of_both_sides({pair: None for chain in _CHAINS for pair in pairwise(chain)}))
 """Sites at the ends of limbs, and of the sides of the trunk; every layout has them."""
 
 

@@ -89,12 +89,8 @@ class MarkerRecording(Recording):
         self.path, self.name, self.root_frame = path, path.stem, FRAME
         self.map = markers or MarkerMap()
         content = read_markers(path)
-        names = (
-            {name: name for name in Body.human(model="full").site_names}
-            | SITES
-            | self.map.sites
-            | {name: name for name in self.map.limbs}
-        )
+        own = Body.human(model="full").site_names
+        names = {name: name for name in own} | SITES | self.map.sites | {name: name for name in self.map.limbs}
         sites, positions = content.of(names)
         self._likely = standing_along(sites, positions)
         if self.map.y_up is None:

@@ -82,12 +82,10 @@ def read_markers(path: str | Path) -> MarkerTrajectories:
     Raises:
         RecordingError: another suffix, damage, or another format.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix == ".trc":
-        return read_trc(path)
-    if suffix == ".c3d":
-        return read_c3d(path)
-    raise RecordingError(f"{path}: expected a .trc or .c3d file, found {suffix or 'no suffix'!r}")
+    suffix, readers = Path(path).suffix.lower(), {".trc": read_trc, ".c3d": read_c3d}
+    if suffix not in readers:
+        raise RecordingError(f"{path}: expected a .trc or .c3d file, found {suffix or 'no suffix'!r}")
+    return readers[suffix](path)
 
 
 def read_trc(path: str | Path) -> MarkerTrajectories:
@@ -101,9 +99,7 @@ def read_trc(path: str | Path) -> MarkerTrajectories:
         RecordingError: another format; names the line.
     """
     path = Path(path)
-    if not path.is_file():
-        raise RecordingError(f"{path}: expected a .trc file, found none")
-    lines = read_stored_text(path, "a readable .trc file").splitlines()
+    lines = read_stored_text(path, "a .trc file").splitlines()
     if len(lines) < 6 or not lines[0].startswith("PathFileType"):
         raise RecordingError(f"{path}: expected a .trc file (PathFileType ... in the first line), found another")
     separator = next((mark for mark in ("\t", ",") if mark in lines[1]), None)

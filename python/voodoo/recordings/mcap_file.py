@@ -90,13 +90,11 @@ class McapFile(McapReader):
                 "FILE.mcap` makes one)"
             )
 
-    def messages(  # type: ignore[override]
-        self, connections: Collection[Connection], start: int | None = None, stop: int | None = None
-    ) -> Iterator[Item]:
+    def messages(self, connections: Collection[Connection], start: int | None = None) -> Iterator[Item]:  # type: ignore[override]
         """Messages in the order of their time, or as they were written if the clock was set back."""
         if not self.chunks:
             self._refuse_unindexed()
-            yield from super().messages(connections, start, stop)
+            yield from super().messages(connections, start)
             return
         if len({chunk.chunk_start_offset for chunk in self.chunks}) != len(self.chunks):
             raise RecordingError(f"{self._file}: expected every chunk once in the index, found one again")

@@ -20,12 +20,10 @@ from voodoo.recordings.order import in_order, matched, numbers_of
 from voodoo.recordings.recording import Recording, Reference, SensorInfo, number_option
 
 SITES = {
-    f"{side}{joint}": f"{side.lower()}_{site}"
+    f"{side}{joint.capitalize()}": f"{side.lower()}_{joint}"
     for side in "LR"
-    for joint, site in {
-        "Shoulder": "shoulder", "Elbow": "elbow", "Wrist": "wrist", "Hip": "hip", "Knee": "knee", "Ankle": "ankle",
-    }.items()
-} | {"Neck": "skullbase", "Head": "skull_tip"}  # fmt: skip
+    for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+} | {"Neck": "skullbase", "Head": "skull_tip"}
 """Pose2Sim's marker names for BODY_25B (its neck is the upper neck) and our sites."""
 
 FRAME = "world"
@@ -73,9 +71,7 @@ class Pose2SimRecording(Recording):
         left_out: LeftOut | None = None,
     ) -> None:
         """Read calibration, the names of the keypoint files and the reference; see the class."""
-        self.path = path
-        self.name = path.name
-        self.root_frame = FRAME
+        self.path, self.name, self.root_frame = path, path.name, FRAME
         self._left_out = left_out
         with naming(path, MeasurementError, error=RecordingError):
             layout_of(layout or "body25b")
@@ -84,8 +80,7 @@ class Pose2SimRecording(Recording):
         placed = read_camera_toml(calibration_of(path), meters_per_unit=scale)
         folders = keypoint_folders(path)
         chosen = cameras_of(path, placed, folders, ("a folder keypoints/*_json", "cameras"), cameras)
-        self.cameras = tuple(camera for camera, _ in chosen)
-        self._folders = tuple(folder for _, folder in chosen)
+        self.cameras, self._folders = zip(*chosen, strict=True)
         self._files, self._notes = _rows_of(path, self._folders)
         self._stamps = np.arange(len(self._files)) / self.rate
         self._check(layout)

@@ -13,12 +13,12 @@ from voodoo.measurements import FloatArray, Measurement, RecordedFrame
 from voodoo.names import TOPIC_KINDS, TopicKind
 from voodoo.recordings import realsense
 from voodoo.recordings.empty_scene import EmptyScene
-from voodoo.recordings.left_out import LeftOut, leaving_out
+from voodoo.recordings.left_out import LeftOut, leave_out, leaving_out
 from voodoo.recordings.recording import Recording, SensorInfo, mean_rate, number_option, usable
 from voodoo.recordings.ros_bag import Bag
 from voodoo.recordings.ros_messages import Message, camera_of, measured, stamp_of
 from voodoo.recordings.ros_topics import TopicChoice, TopicFinder, TopicSource
-from voodoo.recordings.set_back import SetBack
+from voodoo.recordings.set_back import SetBack, out_of_order
 from voodoo.recordings.together import in_turn, together
 from voodoo.recordings.transforms import TransformTree, matrix
 from voodoo.recordings.truth import OWN_ROOTS, find_beside, read_beside
@@ -160,10 +160,7 @@ class RosRecording(Recording):
             stamp = written if moved is None else moved
             before = last.get(topic, -math.inf)
             if moved is None or stamp < before or (stamp == before and self._left_out is not None):
-                raise RecordingError(
-                    f"{where}: expected rising stamps, found {stamp:.6f} after {before:.6f}",
-                    reason="with a repeated stamp" if stamp == before else "with a stamp before the last one",
-                )
+                raise out_of_order(where, stamp, before)
             source = self._sources[topic]
             pose = self._tree.lookup(self.root_frame, self._bag.frame_of(topic, message), stamp)
             units, named = (self._units[topic], self._float_unit), f"{where}, stamp {stamp:.6f}"
@@ -195,9 +192,8 @@ class RosRecording(Recording):
         if given or not self._bag.realsense or all(item.name != units for item in self._bag.topics):
             return otherwise
         with reading(f"{self.path}, topic {units}", "a readable message"):
-            return number_option(
-                self.path, str(units), float(f"{self._bag.first(str(units)).data:.7g}"), "a length > 0", most=1e3
-            )
+            found = float(f"{self._bag.first(str(units)).data:.7g}")
+            return number_option(self.path, str(units), found, "a length > 0", most=1e3)
 
     def _read_transforms(self, asked: str | None, sources: Sequence[TopicSource]) -> str:
         """Fill the transform tree and choose the root frame."""
@@ -266,7 +262,6 @@ class RosRecording(Recording):
                     camera = camera_of(message, source.topic, where)
                     if source.camera is not None and source.camera.model == "inverse_plumb_bob":
                         camera = replace(camera, model="inverse_plumb_bob")
-                    if camera != source.camera and self._left_out is not None:
-                        self._left_out.add("calibrations unlike the first", f"{where}: {camera}")
-                    elif camera != source.camera:
-                        raise RecordingError(f"{where}: expected one calibration, found {camera} after {source.camera}")
+                    if camera != source.camera:
+                        words = f"{where}: expected one calibration, found {camera} after {source.camera}"
+                        leave_out(self._left_out, RecordingError(words), "calibrations unlike the first")

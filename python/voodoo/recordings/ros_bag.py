@@ -14,9 +14,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path, PurePosixPath
-from typing import Any
 
-from rosbags.interfaces import Connection, MessageDefinitionFormat, Nodetype
+from rosbags.interfaces import Connection, MessageDefinitionFormat
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
@@ -86,16 +85,9 @@ class MessageTypes:
             line = "=" * 80 + "\n"
             for part in text.split(line + "IDL: ")[1:] or [f"\n{text}"]:
                 found |= get_types_from_idl(part.split("\n", 1)[1].removesuffix(line))
-        waiting, seen = [kind], set()
-        while waiting:
-            name = waiting.pop()
-            if name in seen or name not in found:
-                continue
-            seen.add(name)
-            fields = self._store.fielddefs[name][1] if name in self._store.fielddefs else None
-            if found[name][1] != fields:
+        for name in found.keys() & self._store.fielddefs.keys():
+            if found[name][1] != self._store.fielddefs[name][1]:
                 raise RecordingError(f"{where}: expected {name} as in ROS 2, found a message with other fields")
-            waiting += [used for _, field in fields if (used := _type_used(field)) is not None]
 
     def deserialize(self, data: bytes, kind: str) -> object:
         """The message in these bytes.
@@ -105,14 +97,6 @@ class MessageTypes:
         """
         read = self._store.deserialize_cdr if self._is_ros2 else self._store.deserialize_ros1
         return read(data, kind)
-
-
-def _type_used(field: Any) -> str | None:  # noqa: ANN401 - of rosbags
-    """The message type of a field, or of its elements."""
-    node, value = field
-    if node in (Nodetype.ARRAY, Nodetype.SEQUENCE):
-        node, value = value[0]
-    return value if node == Nodetype.NAME else None
 
 
 _BAG_SUFFIXES = (".bag", ".mcap", ".db3")
@@ -153,11 +137,7 @@ class Bag:
             _unpack(path, folder, unpacked)
         self._folder = folder
         with self._naming():
-            self._survey()
-
-    def _survey(self) -> None:
-        """Find the bag and read its index."""
-        self.file = find_bag(self._folder) if self._folder.is_dir() else self._folder
+            self.file = find_bag(folder) if folder.is_dir() else folder
         self.is_ros2: bool = self.file.suffix != ".bag"
         self._types = MessageTypes(is_ros2=self.is_ros2)
         with self._open() as reader:
@@ -336,11 +316,8 @@ class Bag:
             return self._named(data)
         if self.realsense and connection.topic.endswith("/image/data"):
             data = data[: -realsense.EXTRA_BYTES]
-        read, where = (
-            partial(self._types.deserialize, data, connection.msgtype),
-            f"{self.path}, topic {connection.topic}",
-        )
-        return or_error(read, where, f"a {connection.msgtype} message")
+        read = partial(self._types.deserialize, data, connection.msgtype)
+        return or_error(read, f"{self.path}, topic {connection.topic}", f"a {connection.msgtype} message")
 
 
 class _Stopped(RecordingError):

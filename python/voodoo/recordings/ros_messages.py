@@ -76,6 +76,13 @@ def is_depth(topic: str, message: Message) -> bool:
     return "compressedDepth" in topic + message.format or words in DEPTH_ENCODINGS or gray[24:] == b"\x10\x00"
 
 
+def channels_of(topic: str, message: Message) -> int:
+    """Number of channels of an image or compressed image, for which it is the most there may be; 0: it is no picture."""
+    if hasattr(message, "format"):
+        return 0 if is_depth(topic, message) else max(COLOR_CHANNELS.values())
+    return COLOR_CHANNELS.get(message.encoding, 0)
+
+
 def has_distances(message: Message) -> bool:
     """Whether a compressed depth image is not a JPEG, whose values of 8 bits are no distances."""
     return message.data[:3].tobytes() != b"\xff\xd8\xff"
@@ -155,20 +162,6 @@ def compressed_depth_image(message: Message, camera: Camera, source: str) -> npt
     return image
 
 
-def _raw_color(message: Message, camera: Camera, source: str) -> ByteImage:
-    """(H, W, 3) BGR uint8 of a raw sensor_msgs/Image.
-
-    Raises:
-        RecordingError: another encoding, fewer bytes than announced, or another size than the camera's.
-    """
-    channels = _encoded(message, "color", COLOR_CHANNELS, source)
-    check_size((message.width, message.height), source, (camera.width, camera.height))
-    image = _rows(message, channels, source).reshape(message.height, message.width, channels)
-    if channels == 1:
-        return np.repeat(image, 3, axis=2)
-    return np.ascontiguousarray(image[:, :, 2::-1] if message.encoding.startswith("rgb") else image[:, :, :3])
-
-
 def color_image(message: Message, camera: Camera, source: str) -> ByteImage:
     """(H, W, 3) BGR uint8 of a raw sensor_msgs/Image, or of a JPEG or PNG sensor_msgs/CompressedImage.
 
@@ -178,7 +171,12 @@ def color_image(message: Message, camera: Camera, source: str) -> ByteImage:
     with reading(source, "a readable picture"):
         if hasattr(message, "format"):
             return decode_color(message.data.tobytes(), source, (camera.width, camera.height))
-        return _raw_color(message, camera, source)
+        channels = _encoded(message, "color", COLOR_CHANNELS, source)
+        check_size((message.width, message.height), source, (camera.width, camera.height))
+        image = _rows(message, channels, source).reshape(message.height, message.width, channels)
+        if channels == 1:
+            return np.repeat(image, 3, axis=2)
+        return np.ascontiguousarray(image[:, :, 2::-1] if message.encoding.startswith("rgb") else image[:, :, :3])
 
 
 def cloud_points(message: Message, source: str) -> FloatArray:
@@ -191,10 +189,8 @@ def cloud_points(message: Message, source: str) -> FloatArray:
     height, width, step = int(message.height), int(message.width), int(message.point_step)
     order = ">" if message.is_bigendian else "<"
     try:
-        formats, offsets = (
-            [order + _POINT_FIELDS[fields[name][0]] for name in "xyz"],
-            [fields[name][1] for name in "xyz"],
-        )
+        formats = [order + _POINT_FIELDS[fields[name][0]] for name in "xyz"]
+        offsets = [fields[name][1] for name in "xyz"]
         layout = np.dtype({"names": list("xyz"), "formats": formats, "offsets": offsets, "itemsize": step})
     except (KeyError, ValueError, OverflowError):
         expected = f"fields x, y, z of datatype 1 to 8, none of which leaves the point of {step} bytes"
@@ -219,9 +215,8 @@ def scan_fields(message: Message, source: str) -> dict[str, Any]:
     Raises:
         RecordingError: angles or limits that are not finite, or a zero increment.
     """
-    numbers = {
-        name: float(getattr(message, name)) for name in ("angle_min", "angle_increment", "range_min", "range_max")
-    }
+    names = ("angle_min", "angle_increment", "range_min", "range_max")
+    numbers = {name: float(getattr(message, name)) for name in names}
     finite = all(math.isfinite(value) for name, value in numbers.items() if name != "range_max")
     if not finite or math.isnan(numbers["range_max"]) or numbers["angle_increment"] == 0.0:
         raise RecordingError(f"{source}: expected finite angles and limits and an increment, found {numbers}")

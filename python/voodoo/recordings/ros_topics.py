@@ -13,12 +13,12 @@ from voodoo.recordings import realsense
 from voodoo.recordings.order import natural
 from voodoo.recordings.ros_bag import Bag
 from voodoo.recordings.ros_messages import (
-    COLOR_CHANNELS,
     DEPTH_ENCODINGS,
     NO_DISTANCES,
     Message,
     base_topic,
     camera_of,
+    channels_of,
     has_distances,
     is_depth,
     stamp_of,
@@ -107,11 +107,10 @@ class TopicFinder:
         return sources
 
     def _chosen(self, kind: TopicKind) -> list[str]:
-        names = self._choices[kind] or []
+        names, fit = self._choices[kind] or [], self._of_types(*_TYPES[kind])
         for name in names:
-            topic = self._topics.get(name)
-            if topic is None or topic.type not in _TYPES[kind] or topic.messages == 0:
-                fit = [item.name for item in self.bag.topics if item.type in _TYPES[kind] and item.messages]
+            if name not in fit:
+                topic = self._topics.get(name)
                 found = "no such topic" if topic is None else f"{topic.messages} messages of type {topic.type}"
                 raise RecordingError(
                     f"{self.bag.path}: {kind}_topic {name!r}: expected one of {', '.join(fit) or 'none in this bag'}, "
@@ -119,10 +118,14 @@ class TopicFinder:
                 )
         return names
 
+    def _of_types(self, *types: str) -> list[str]:
+        """Topics with messages of some types."""
+        return [topic.name for topic in self.bag.topics if topic.type in types and topic.messages]
+
     def _free(self, kind: TopicKind) -> list[str]:
         """Topics of the types of a kind that the user chose for no kind."""
         chosen = {name for names in self._choices.values() for name in names or ()}
-        return [t.name for t in self.bag.topics if t.type in _TYPES[kind] and t.messages and t.name not in chosen]
+        return [name for name in self._of_types(*_TYPES[kind]) if name not in chosen]
 
     def _automatic(self, kind: TopicKind) -> list[str]:
         names = self._free(kind)
@@ -163,8 +166,7 @@ class TopicFinder:
         self.unused += [
             (name, words if words == NO_DISTANCES else "not a depth encoding") for name, words in refused.items()
         ]
-        rest = any(topic.type in (*_TYPES["points"], *_TYPES["scan"]) and topic.messages for topic in self.bag.topics)
-        if refused and not usable and not (rest and set(refused.values()) == {NO_DISTANCES}):
+        if refused and not usable and not (self._of_types(CLOUD, SCAN) and set(refused.values()) == {NO_DISTANCES}):
             found = ", ".join(f"{name}: {words}" for name, words in refused.items())
             raise RecordingError(
                 f"{self.bag.path}: expected a depth topic encoded as {', '.join(DEPTH_ENCODINGS)}, found {found}"
@@ -191,15 +193,7 @@ class TopicFinder:
 
     def _pictures(self, names: list[str], *, channels: int) -> list[str]:
         """Topics with images of at least a number of channels."""
-        usable = []
-        for name in names:
-            message = self._message(name)
-            if self._topics[name].type == COMPRESSED:
-                if not is_depth(name, message):
-                    usable.append(name)
-            elif COLOR_CHANNELS.get(message.encoding, 0) >= channels:
-                usable.append(name)
-        return usable
+        return [name for name in names if channels_of(name, self._message(name)) >= channels]
 
     def _same_as_depth(self, source: TopicSource, sources: list[TopicSource]) -> bool:
         """Whether a cloud has the same data as a depth image, which would then have twice its weight."""
@@ -229,18 +223,17 @@ class TopicFinder:
         expected = (realsense.info_topic if self.bag.realsense else info_topic)(name)
         if kind == "depth" and self._camera_info_topic is not None:
             expected = self._camera_info_topic
-        topic = self._topics.get(expected)
-        if topic is None or topic.type != CAMERA_INFO or topic.messages == 0:
-            infos = ", ".join(t.name for t in self.bag.topics if t.type == CAMERA_INFO and t.messages) or "none"
+        infos = self._of_types(CAMERA_INFO)
+        if expected not in infos:
             raise RecordingError(
                 f"{self.bag.path}: expected the calibration of {name} (frame {frame!r}) on {expected}, "
-                f"found CameraInfo topics: {infos}"
+                f"found CameraInfo topics: {', '.join(infos) or 'none'}"
                 + (" (choose with camera_info_topic=, --topic camera_info=NAME)" if kind == "depth" else "")
             )
         source = f"{self.bag.path}, topic {expected}"
         camera = camera_of(self._message(expected, lambda info: camera_of(info, name, source)), name, source)
         lens = realsense.beside(name, realsense.LENS)
-        if lens in self._topics and self._topics[lens].type == STRING and self._topics[lens].messages:
+        if lens in self._of_types(STRING):
             camera = realsense.with_lens(camera, self._message(lens))
         return expected, camera
 

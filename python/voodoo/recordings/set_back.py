@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from voodoo.errors import RecordingError
+
 BACK_S = 1.0
 """A stamp that is less before the last one is out of order."""
 
@@ -13,6 +15,12 @@ def falls(times: Iterable[tuple[int, int]]) -> bool:
     """Whether, of (connection, time of recording [ns]) as they were written, the times of one connection fall by over BACK_S."""
     last: dict[int, int] = {}
     return any(time < last.get(one, time) - BACK_S * 1e9 or last.update({one: time}) for one, time in times)
+
+
+def out_of_order(where: object, stamp: float, before: float) -> RecordingError:
+    """The error for a stamp [s] that does not rise from the one before."""
+    reason = "with a repeated stamp" if stamp == before else "with a stamp before the last one"
+    return RecordingError(f"{where}: expected rising stamps, found {stamp:.6f} after {before:.6f}", reason=reason)
 
 
 @dataclass

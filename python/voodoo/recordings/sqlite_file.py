@@ -178,9 +178,7 @@ class SqliteFile:
                 duration=last + 1 - first, start_time=first, end_time=last + 1, message_count=count
             )
 
-    def messages(
-        self, connections: Collection[Connection], start: int | None = None, stop: int | None = None
-    ) -> Iterator[Item]:
+    def messages(self, connections: Collection[Connection], start: int | None = None) -> Iterator[Item]:
         """See bag_file; those in a damaged part of the file are errors."""
         wanted = {item.id: item for item in connections}
         places = ",".join("?" * len(wanted))

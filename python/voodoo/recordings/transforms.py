@@ -94,8 +94,7 @@ class TransformTree:
         self._set_back = set_back
         self.source = source
         self.max_age = max_age
-        self._edges: dict[tuple[str, str], _Edge] = {}
-        self._neighbors: dict[str, list[str]] = {}
+        self._neighbors: dict[str, dict[str, tuple[_Edge, bool]]] = {}
 
     @property
     def frames(self) -> tuple[str, ...]:
@@ -117,16 +116,16 @@ class TransformTree:
 
     def add_edge(self, parent: str, child: str, stamp: float, transform: FloatArray, *, static: bool) -> None:
         """Add parent_from_child (4, 4) at a stamp [s]."""
-        if (parent, child) not in self._edges:
-            self._edges[parent, child] = _Edge()
-            self._neighbors.setdefault(parent, []).append(child)
-            self._neighbors.setdefault(child, []).append(parent)
-        self._edges[parent, child].add(stamp, transform, static=static)
+        beside = self._neighbors.setdefault(parent, {})
+        if child not in beside or not beside[child][1]:
+            beside[child] = _Edge(), True
+            self._neighbors.setdefault(child, {}).setdefault(parent, (beside[child][0], False))
+        beside[child][0].add(stamp, transform, static=static)
 
     def keep(self, since: float, until: float) -> None:
         """Discard changing transforms outside these stamps [s], to limit the memory of a live source."""
-        for edge in self._edges.values():
-            if not edge.constant:
+        for edge, is_own in (one for others in self._neighbors.values() for one in others.values()):
+            if is_own and not edge.constant:
                 edge.keep(since, until)
 
     def covers(self, root: str, frame: str, stamp: float) -> bool:
@@ -143,7 +142,7 @@ class TransformTree:
     def _chain(self, root: str, frame: str) -> list[_Edge] | None:
         """The transforms between two frames; None if they are not connected."""
         try:
-            return [self._edge(a, b)[0] for a, b in pairwise(self.path(root, frame))]
+            return [self._neighbors[a][b][0] for a, b in pairwise(self.path(root, frame))]
         except RecordingError:
             return None
 
@@ -184,16 +183,11 @@ class TransformTree:
             RecordingError: not connected, or no transform near the stamp.
         """
         result = np.eye(4)
-        path = self.path(root, frame)
-        for a, b in pairwise(path):
-            edge, forward = self._edge(a, b)
+        for a, b in pairwise(self.path(root, frame)):
+            edge, forward = self._neighbors[a][b]
             transform = self._at(edge, stamp, a, b)
             result = result @ (transform if forward else inverse(transform))
         return result
-
-    def _edge(self, a: str, b: str) -> tuple[_Edge, bool]:
-        edge = self._edges.get((a, b))
-        return (edge, True) if edge is not None else (self._edges[b, a], False)
 
     def _at(self, edge: _Edge, stamp: float, a: str, b: str) -> FloatArray:
         if edge.constant:

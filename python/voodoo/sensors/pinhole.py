@@ -32,14 +32,8 @@ class Pinhole:
         fraction = min(1.0, float(np.sqrt(most / (camera.width * camera.height))))
         width, height = max(round(camera.width * fraction), 1), max(round(camera.height * fraction), 1)
         x, y = width / camera.width, height / camera.height
-        self.camera = Camera(
-            width,
-            height,
-            camera.fx * x,
-            camera.fy * y,
-            (camera.cx + 0.5) * x - 0.5,
-            (camera.cy + 0.5) * y - 0.5,
-        )
+        cx, cy = (camera.cx + 0.5) * x - 0.5, (camera.cy + 0.5) * y - 0.5
+        self.camera = Camera(width, height, camera.fx * x, camera.fy * y, cx, cy)
         self._maps: tuple[npt.NDArray[Any], npt.NDArray[Any]] | None = None
         if camera.distorted:
             rays = self.camera.rays().reshape(-1, 2).astype(np.float64)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-import numpy.typing as npt
 
 from voodoo._core import Frame
 from voodoo._core import SiteRay as SiteRay
@@ -36,11 +35,6 @@ class TriangulatedSite:
     sigma: float
     trust: FloatArray
 
-    @property
-    def visible_in(self) -> npt.NDArray[np.bool_]:
-        """Which rays (N,) support it."""
-        return np.asarray(self.trust >= TRUSTED)
-
 
 def place_of(rays: Sequence[SiteRay], *, scale: float = AGREE_M) -> TriangulatedSite | None:
     """Triangulates the rays of one site by robust least squares; returns None if fewer than two rays agree.
@@ -54,16 +48,11 @@ def place_of(rays: Sequence[SiteRay], *, scale: float = AGREE_M) -> Triangulated
     directions = np.array([ray.direction for ray in rays])
     planes = across(directions)
     information = np.array([1.0 / ray.sigma**2 for ray in rays])
-    best: tuple[float, FloatArray] | None = None
-    for pair in combinations(range(len(rays)), 2):
-        point = _meeting(origins[list(pair)], directions[list(pair)], planes[list(pair)])
-        if point is not None:
-            total = float(trust_at(point, origins, directions, scale=scale).sum())
-            if best is None or total > best[0]:
-                best = total, point
-    if best is None:
-        return None
-    found = met(origins, directions, information, best[1], scale=scale)
+    pairs = map(list, combinations(range(len(rays)), 2))
+    points = [_meeting(origins[pair], directions[pair], planes[pair]) for pair in pairs]
+    known = [point for point in points if point is not None]
+    best = max(known, key=lambda point: trust_at(point, origins, directions, scale=scale).sum(), default=None)
+    found = None if best is None else met(origins, directions, information, best, scale=scale)
     if found is None:
         return None
     point, trust = found
@@ -152,10 +141,8 @@ def met(
         matrix = (weights[:, None, None] * planes).sum(axis=0) + prior * np.eye(3)
         if not prior and float(np.linalg.eigvalsh(matrix)[0]) <= 0.0:
             return None
-        moved = np.linalg.solve(matrix, weights @ offsets + prior * start)
-        done = float(np.linalg.norm(moved - point)) < _MOVED_M
-        point = moved
-        if done:
+        before, point = point, np.linalg.solve(matrix, weights @ offsets + prior * start)
+        if float(np.linalg.norm(point - before)) < _MOVED_M:
             break
     return point, trust_at(point, origins, directions, scale=scale)
 

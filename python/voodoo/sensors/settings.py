@@ -12,15 +12,19 @@ import numpy.typing as npt
 from voodoo.errors import MeasurementError
 from voodoo.measurements import ByteImage, FloatArray
 from voodoo.model.joint import corners
+from voodoo.names import INPUTS
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.keypoints.sites import check_confidence
-from voodoo.sensors.kinds import inputs, inputs_of
 from voodoo.sensors.model import PLANAR_LASER, POINTS_SHARING, PixelNoise, RangeNoise, SensorModel
 from voodoo.sensors.skin.settings import SkinSettings
 
+KNOWN: dict[str, str] = {kind: "color" if kind == "skin" else kind for kind in INPUTS}
+"""Kind of input -> kind of its sensors in recordings (see `SensorInfo`): INPUTS first, then others in the order in which their
+adapters were registered."""
 Box: TypeAlias = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Two opposite corners [m], the lower one first."""
+Corner: TypeAlias = tuple[float, float, float] | FloatArray
 LEVEL_FRAMES = ("base_link", "base_footprint", "odom", "map")
 """Root frames whose z = 0 is the floor (REP-105)."""
 WHOLE_BODY = ("depth", "points", "keypoints", "markers")
@@ -29,7 +33,7 @@ WHOLE_BODY = ("depth", "points", "keypoints", "markers")
 
 def default_inputs() -> tuple[str, ...]:
     """Returns the default inputs: all but the two cues of color images."""
-    return tuple(kind for kind in inputs() if kind not in ("color", "skin"))
+    return tuple(kind for kind in KNOWN if kind not in ("color", "skin"))
 
 
 @dataclass(frozen=True)
@@ -85,9 +89,9 @@ class FrontEndSettings:
         check_confidence(self.min_confidence)
         for box in self.exclude:
             corners("exclude", box, MeasurementError)
-        unknown = sorted(set(self.use) - set(inputs()))
+        unknown = sorted(set(self.use) - set(KNOWN))
         if unknown or not self.use:
-            raise MeasurementError(f"use: expected some of {', '.join(inputs())}, found {', '.join(unknown) or 'none'}")
+            raise MeasurementError(f"use: expected some of {', '.join(KNOWN)}, found {', '.join(unknown) or 'none'}")
 
     @property
     def clothes(self) -> bool:
@@ -119,7 +123,8 @@ class FrontEndSettings:
 
 def inputs_in(recording: Recording) -> set[str]:
     """The inputs that the sensors of a recording provide."""
-    return {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
+    recorded = {sensor.kind for sensor in recording.info().sensors}
+    return {kind for kind, name in KNOWN.items() if name in recorded}
 
 
 def inputs_for(recording: Recording) -> tuple[str, ...]:
@@ -127,12 +132,13 @@ def inputs_for(recording: Recording) -> tuple[str, ...]:
     has = inputs_in(recording)
     if has & set(WHOLE_BODY) or "color" not in has:
         return default_inputs()
-    return tuple(kind for kind in inputs() if kind != "skin")
+    return tuple(kind for kind in KNOWN if kind != "skin")
 
 
-def within_boxes(places: FloatArray, boxes: Sequence[Box]) -> npt.NDArray[np.bool_]:
+def within_boxes(places: FloatArray, boxes: Sequence[tuple[Corner, Corner]]) -> npt.NDArray[np.bool_]:
     """Which positions (N, 3) [m] lie in one of the boxes."""
     inside = np.zeros(len(places), dtype=bool)
     for low, high in boxes:
-        inside |= ((places >= low) & (places <= high)).all(axis=1)
+        x, y, z = ((places[:, axis] >= low[axis]) & (places[:, axis] <= high[axis]) for axis in range(3))
+        inside |= x & y & z
     return inside

@@ -53,10 +53,6 @@ def render_depth(
         BodyError: a limb is missing or unknown.
         MeasurementError: a matrix is not rigid.
     """
-    depth, limb = _core.render_depth(
-        body.core,
-        ordered_poses(body, world_from_limb),
-        camera=camera,
-        world_from_sensor=world_from_sensor,
-    )
+    poses = ordered_poses(body, world_from_limb)
+    depth, limb = _core.render_depth(body.core, poses, camera=camera, world_from_sensor=world_from_sensor)
     return RenderedDepth(depth, limb, body.limb_names)

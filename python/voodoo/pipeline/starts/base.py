@@ -11,8 +11,10 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.measurements import FloatArray
+from voodoo.measurements import FloatArray, KeypointImage
 from voodoo.model.body import Body
+from voodoo.recordings.keypoint_layouts import of_both_sides
+from voodoo.sensors.keypoints.sites import SitePixel, site_pixels
 from voodoo.sensors.settings import FrontEndSettings
 
 TRUNK = ("l_shoulder", "r_shoulder", "l_hip", "r_hip", "vc7", "humanoid_root")
@@ -20,22 +22,21 @@ TRUNK = ("l_shoulder", "r_shoulder", "l_hip", "r_hip", "vc7", "humanoid_root")
 BONES_M: dict[tuple[str, str], tuple[float, float]] = {
     ("l_shoulder", "r_shoulder"): (0.12, 0.60),
     ("l_hip", "r_hip"): (0.06, 0.45),
-    **{
-        (f"{s}_{a}", f"{s}_{b}"): limits
-        for s in "lr"
-        for a, b, limits in (
-            ("shoulder", "hip", (0.22, 0.85)),
-            ("shoulder", "elbow", (0.12, 0.50)),
-            ("elbow", "wrist", (0.10, 0.45)),
-            ("hip", "knee", (0.18, 0.70)),
-            ("knee", "ankle", (0.18, 0.65)),
-            ("wrist", "hand", (0.01, 0.25)),
-            ("ankle", "toe", (0.04, 0.35)),
-        )
-    },
-}
+} | of_both_sides({
+    ("shoulder", "hip"): (0.22, 0.85),
+    ("shoulder", "elbow"): (0.12, 0.50),
+    ("elbow", "wrist"): (0.10, 0.45),
+    ("hip", "knee"): (0.18, 0.70),
+    ("knee", "ankle"): (0.18, 0.65),
+    ("wrist", "hand"): (0.01, 0.25),
+    ("ankle", "toe"): (0.04, 0.35),
+})  # fmt: skip
 """Smallest and largest distance [m] of two sites, from a child of 1 m to a man of 2.1 m, with 5 cm of error at either end;
 parents first."""
+TOGETHER_S = 0.05
+"""Images within this time belong to one instant: a walking person's wrist moves 10 cm in it."""
+LEAST_SITES = 6
+"""Sites that are needed for a first pose from keypoints."""
 _ON_A_LINE_M = 0.04
 
 
@@ -54,6 +55,13 @@ class StartFrame:
     measurements: Sequence[Any]
     body: Body
     settings: FrontEndSettings
+
+
+def seen_sites(item: KeypointImage, rows: FloatArray, frame: StartFrame) -> list[SitePixel]:
+    """The sites of the body at the keypoints (K, 3) of one person; [] if they are too few for a first pose."""
+    sites, _ = site_pixels(rows, layout=item.layout, min_confidence=frame.settings.min_confidence)
+    sites = [site for site in sites if site.site in frame.body.site_names]
+    return sites if len(sites) >= LEAST_SITES else []
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,19 +153,15 @@ _SHORTER, _LONGER = 0.6, 1.6
 _OF_STATURE: dict[tuple[str, str], float] = {
     ("l_shoulder", "r_shoulder"): 0.224,
     ("l_hip", "r_hip"): 0.104,
-    **{
-        (f"{s}_{a}", f"{s}_{b}"): fraction
-        for s in "lr"
-        for a, b, fraction in (
-            ("shoulder", "hip", 0.294),
-            ("shoulder", "elbow", 0.186),
-            ("elbow", "wrist", 0.146),
-            ("hip", "knee", 0.245),
-            ("knee", "ankle", 0.246),
-        )
-    },
+} | of_both_sides({
+    ("shoulder", "hip"): 0.294,
+    ("shoulder", "elbow"): 0.186,
+    ("elbow", "wrist"): 0.146,
+    ("hip", "knee"): 0.245,
+    ("knee", "ankle"): 0.246,
+}) | {
     ("l_shoulder", "skullbase"): 0.146,
     ("l_shoulder", "head_center"): 0.164,
     ("l_shoulder", "skull_tip"): 0.211,
-}
+}  # fmt: skip
 """Distances of sites of the default human, as fractions of the stature; parents first."""

@@ -10,21 +10,12 @@ import numpy as np
 
 import voodoo._core as _core
 from voodoo.measurements import DepthImage, FloatArray, KeypointImage
-from voodoo.pipeline.starts.base import (
-    FoundStart,
-    StartFinder,
-    StartFrame,
-    fixes_pose,
-    in_proportion,
-    without_impossible,
-)
+from voodoo.pipeline.starts import base
+from voodoo.pipeline.starts.base import FoundStart, StartFinder, StartFrame
 from voodoo.sensors.depth import depth_points
-from voodoo.sensors.keypoints.sites import POINT_SIGMA_M, SitePixel, behind_surface, site_pixels
+from voodoo.sensors.keypoints.sites import POINT_SIGMA_M, SitePixel, behind_surface
 from voodoo.sensors.pixels import in_sensor, world_rays
 
-_TOGETHER_S = 0.05
-"""Images within this time belong to one instant: a walking person's wrist moves 10 cm in it."""
-_LEAST_SITES = 6
 _AROUND = 2.5
 """The surface is searched for within this many pixels, as in a 5 x 5 window; for a coarser depth camera, in its pixels."""
 
@@ -54,18 +45,16 @@ class KeypointsDepthStart(StartFinder):
 
 def _people(item: KeypointImage, depths: Sequence[DepthImage], frame: StartFrame) -> Iterator[_Person]:
     """The persons of an image that can give a first pose, with the depth image that is nearest in time."""
-    near = [depth for depth in depths if abs(depth.stamp - item.stamp) <= _TOGETHER_S]
+    near = [depth for depth in depths if abs(depth.stamp - item.stamp) <= base.TOGETHER_S]
     if not near or not item.people:
         return
     depth = min(near, key=lambda each: (abs(each.stamp - item.stamp), each.camera != item.camera))
     surface = _points_in_view(depth, item)
     for rows in item.people:
-        sites, _ = site_pixels(rows, layout=item.layout, min_confidence=frame.settings.min_confidence)
-        sites = [site for site in sites if site.site in frame.body.site_names]
-        if len(sites) >= _LEAST_SITES:
+        if sites := base.seen_sites(item, rows, frame):
             person = _placed(sites, item, surface, frame, coarse=item.camera.fx / depth.camera.fx)
-            kept = in_proportion(without_impossible({name: place for name, (place, _) in person.items()}))
-            if len(kept) >= _LEAST_SITES and fixes_pose(kept, frame.body):
+            kept = base.in_proportion(base.without_impossible({name: place for name, (place, _) in person.items()}))
+            if len(kept) >= base.LEAST_SITES and base.fixes_pose(kept, frame.body):
                 yield {name: person[name] for name in kept}
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import combinations, permutations
+from itertools import combinations, permutations, product
 from typing import Any
 
 import cv2
@@ -80,18 +80,15 @@ class LegsStart(StartFinder):
             return None
         reach = _FASTEST * (scan.stamp - before[0])
         origin = scan.root_from_sensor[:2, 3]
-        pairs = []
-        for legs in map(np.array, combinations(middles, 2)):
-            apart = float(np.linalg.norm(legs[0] - legs[1]))
-            if _APART_M[0] <= apart <= _APART_M[1]:
-                for earlier in map(np.array, permutations(before[1], 2)):
-                    if float(np.linalg.norm(legs - earlier, axis=1).max()) <= reach:
-                        away = float(np.linalg.norm(legs.mean(axis=0) - origin))
-                        pairs.append((away, legs, (legs - earlier).mean(axis=0)))
-        if not pairs:
-            return None
-        _, legs, moved = min(pairs, key=lambda pair: pair[0])
-        return legs, moved
+        pairs = [
+            (legs, (legs - earlier).mean(axis=0))
+            for legs, earlier in product(
+                map(np.array, combinations(middles, 2)), map(np.array, permutations(before[1], 2))
+            )
+            if _APART_M[0] <= float(np.linalg.norm(legs[0] - legs[1])) <= _APART_M[1]
+            and float(np.linalg.norm(legs - earlier, axis=1).max()) <= reach
+        ]
+        return min(pairs, key=lambda pair: float(np.linalg.norm(pair[0].mean(axis=0) - origin)), default=None)
 
 
 CELL_M, SIZE_M = 0.10, 40.0

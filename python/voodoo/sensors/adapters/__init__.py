@@ -22,7 +22,7 @@ from voodoo.sensors.adapters.keypoints import KeypointsAdapter
 from voodoo.sensors.adapters.markers import MarkersAdapter
 from voodoo.sensors.adapters.points import PointsAdapter, ScanAdapter
 from voodoo.sensors.adapters.skin import SkinAdapter
-from voodoo.sensors.kinds import KNOWN
+from voodoo.sensors.settings import KNOWN
 
 _adapters: dict[str, Adapter[Any]] = {}
 _by_class: dict[type, tuple[Adapter[Any], ...]] = {}

@@ -34,13 +34,6 @@ class MarkersAdapter(Adapter[MarkerSet]):
 
     def log(self, item: MarkerSet, log: Log, memory: Memory) -> None:
         """Named points."""
-        log.send(
-            f"world/markers/{log.entity(item.sensor)}",
-            log.rr.Points3D(
-                list(item.positions.values()),
-                radii=0.015,
-                colors=(255, 60, 60),
-                labels=list(item.positions),
-                show_labels=False,
-            ),
-        )
+        names, places = list(item.positions), list(item.positions.values())
+        points = log.rr.Points3D(places, radii=0.015, colors=(255, 60, 60), labels=names, show_labels=False)
+        log.send(f"world/markers/{log.entity(item.sensor)}", points)

@@ -37,16 +37,12 @@ class SkinAdapter(Adapter[ColorImage]):
         is_measured = depth is not None and context.estimate.limb_status.get("head") == "measured"
         heads = {site for site in skin.settings.sites if is_measured and site.startswith("head")}
         rays = skin.observe(
-            item.image,
-            item.camera,
-            item.root_from_sensor,
+            item,
             then,
-            stamp=item.stamp,
             depth=depth,
             tracker=context.tracker,
             others=context.others,
             head_visible=heads,
-            source=item.sensor,
             moved=context.predicted,
         )
         context.rays.extend(rays)
@@ -60,7 +56,7 @@ class SkinAdapter(Adapter[ColorImage]):
         skin = memory.all(self.kind).get(item.sensor)
         if skin is not None:
             # Learning from the first frame with its set pose lets a color camera alone start.
-            skin.learn(item.image, item.camera, item.root_from_sensor, estimate, trusted_start=trusted_start)
+            skin.learn(item, estimate, trusted_start=trusted_start)
 
     def forget(self, memory: Memory) -> None:
         """Discard the learned colors, since the next person's skin has others."""

@@ -7,13 +7,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 import voodoo._core as _core
 from voodoo._core import Frame
-from voodoo.errors import MeasurementError
+from voodoo.errors import MeasurementError, of_kind
 from voodoo.measurements import DepthArray, FloatArray, KeypointImage
 from voodoo.model.camera import Camera
 from voodoo.model.joint import numbers_of
@@ -21,7 +22,7 @@ from voodoo.model.transforms import rigid
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.model import PixelNoise, SensorModel
-from voodoo.sensors.pixels import checked_camera, ray_distance, world_rays
+from voodoo.sensors.pixels import ray_distance, world_rays
 from voodoo.sensors.rays import SiteRay, add_rays
 
 EDGE_M = 0.10
@@ -119,12 +120,8 @@ def checked_rows(keypoints: npt.ArrayLike, layout: str) -> FloatArray:
 @lru_cache(maxsize=32)
 def compiled(layout: str) -> _core.KeypointLayout:
     """The core's object for a layout."""
-    return _core.KeypointLayout(
-        [
-            (part.site, list(part.weights.items()), part.spread, behind_surface(part.site))
-            for part in layout_of(layout).parts
-        ]
-    )
+    parts = layout_of(layout).parts
+    return _core.KeypointLayout([(p.site, list(p.weights.items()), p.spread, behind_surface(p.site)) for p in parts])
 
 
 def check_confidence(least: object) -> None:
@@ -252,7 +249,7 @@ class KeypointSensor:
         if self.sites and (unknown := sorted(set(self.sites) - {part.site for part in parts})):
             known = [part.site for part in parts]
             raise MeasurementError(f"sites: expected some of {', '.join(known)}, found {', '.join(unknown)}")
-        checked_camera(self.camera)
+        of_kind("camera", self.camera, Camera, MeasurementError)
         rigid(self.world_from_sensor)
         check_confidence(self.min_confidence)
 
@@ -260,25 +257,19 @@ class KeypointSensor:
         self,
         frame: Frame,
         keypoints: npt.ArrayLike,
-        *,
-        predicted: Mapping[str, FloatArray],
-        gate: SiteGate | None = None,
-        depth: DepthArray | None = None,
-        meters_per_unit: float = 0.001,
+        **how: Any,  # noqa: ANN401 - of observe
     ) -> KeypointReport:
         """Add the keypoints of one person in one image to a frame; for several cameras see `observe`.
+
+        Args:
+            frame: that the rays and points are added to.
+            keypoints: (K, 3), see site_pixels.
+            **how: predicted, gate, depth, meters_per_unit, before: see `observe`.
 
         Raises:
             MeasurementError: wrong shapes, or an unknown layout.
         """
-        report, rays, points = self.observe(
-            keypoints,
-            stamp=frame.stamp,
-            predicted=predicted,
-            gate=gate,
-            depth=depth,
-            meters_per_unit=meters_per_unit,
-        )
+        report, rays, points = self.observe(keypoints, stamp=frame.stamp, **how)
         add_rays(frame, rays, model=self.model)
         for site, (position, sigma) in points.items():
             frame.add_position(site, position, weight=self.model.weight(sigma), source=self.source)
@@ -318,17 +309,16 @@ class KeypointSensor:
             MeasurementError: wrong shapes, or an unknown layout.
         """
         pose = rigid(self.world_from_sensor)
-        if depth is not None and depth.shape != (self.camera.height, self.camera.width):
-            expected = (self.camera.height, self.camera.width)
-            raise MeasurementError(f"depth: expected the camera's shape {expected}, found {depth.shape}")
-        camera = self.camera
+        shape = (self.camera.height, self.camera.width)
+        if depth is not None and depth.shape != shape:
+            raise MeasurementError(f"depth: expected the camera's shape {shape}, found {depth.shape}")
         found, places, unseen, dropped = compiled(self.layout).observe(
             checked_rows(keypoints, self.layout),
             predicted,
             stamp=stamp,
             source=self.source,
             world_from_sensor=pose,
-            camera=camera,
+            camera=self.camera,
             noise=self.noise.pixels,
             place_sigma=POINT_SIGMA_M,
             least=self.min_confidence,

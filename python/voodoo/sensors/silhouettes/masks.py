@@ -12,6 +12,7 @@ import numpy.typing as npt
 from voodoo.errors import MeasurementError
 from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
+from voodoo.model.joint import numbers_of
 from voodoo.model.projection import CameraView
 
 Mask: TypeAlias = npt.NDArray[np.bool_]
@@ -36,16 +37,14 @@ def filled(mask: Mask) -> Mask:
     return np.asarray((closed != 0) | small[labels], dtype=bool)
 
 
-def known_place(site: str, position: npt.ArrayLike) -> FloatArray:
-    """The position (3,) [m] of a known site, checked.
+def known_places(known: Mapping[str, npt.ArrayLike]) -> dict[str, FloatArray]:
+    """The positions (3,) [m] of known sites, checked.
 
     Raises:
-        MeasurementError: it is not three finite numbers.
+        MeasurementError: one is not three finite numbers.
     """
-    place = np.asarray(position, dtype=np.float64).reshape(-1)
-    if place.shape != (3,) or not np.isfinite(place).all():
-        raise MeasurementError(f"known[{site}]: expected three finite numbers, found {position!r}")
-    return place
+    kind, expected = MeasurementError, "three finite numbers"
+    return {site: numbers_of(f"known[{site}]", place, kind, expected, count=3) for site, place in known.items()}
 
 
 _BESIDE_M, _TRUNK_M, _GIRTH_M = 0.35, 0.15, 0.12
@@ -88,7 +87,7 @@ def surroundings(
     Raises:
         MeasurementError: a position is not three finite numbers.
     """
-    places = {site: known_place(site, position) for site, position in known.items()}
+    places = known_places(known)
     pixels, depths = CameraView(camera, root_from_sensor).project(np.array(list(places.values())).reshape(-1, 3))
     mask = np.zeros((camera.height, camera.width), dtype=np.uint8)
     if not places or not np.isfinite(pixels).all():

@@ -4,6 +4,7 @@ static background, but an approximate posture."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,7 @@ from voodoo.tracker import Tracker
 LIKELY = 0.5
 """Least probability for a pixel to belong to the body."""
 _SMALLEST_PX = 60
+_lens_of = lru_cache(maxsize=16)(Pinhole)
 
 
 class RegionSilhouettes:
@@ -31,7 +33,6 @@ class RegionSilhouettes:
     def __init__(self, body: Body) -> None:
         """Start without learned colors."""
         self._tracker = Tracker(body)
-        self._lenses: dict[str, Pinhole] = {}
 
     def of(
         self, pictures: Sequence[ColorImage], world_from_limb: Mapping[str, npt.ArrayLike]
@@ -48,7 +49,7 @@ class RegionSilhouettes:
             return []
         found = self._tracker.segment(self._frame(pictures), world_from_limb=world_from_limb)
         masks = (without_specks(filled(found[item.sensor] > LIKELY), smallest=_SMALLEST_PX) for item in pictures)
-        return [(mask, self._lenses[item.sensor].camera) for mask, item in zip(masks, pictures, strict=True)]
+        return [(mask, _lens_of(item.camera).camera) for mask, item in zip(masks, pictures, strict=True)]
 
     def learn(self, pictures: Sequence[ColorImage], world_from_limb: Mapping[str, npt.ArrayLike]) -> None:
         """Learn the colors from images of one instant with the posture of the body in them.
@@ -62,13 +63,7 @@ class RegionSilhouettes:
     def _frame(self, pictures: Sequence[ColorImage]) -> Frame:
         frame = Frame(pictures[0].stamp)
         for item in pictures:
-            lens = self._lenses.get(item.sensor)
-            if lens is None or lens.original != item.camera:
-                lens = self._lenses[item.sensor] = Pinhole(item.camera)
-            frame.add_color(
-                np.ascontiguousarray(lens.apply(item.image)),
-                camera=lens.camera,
-                world_from_sensor=item.root_from_sensor,
-                source=item.sensor,
-            )
+            lens = _lens_of(item.camera)
+            seen = np.ascontiguousarray(lens.apply(item.image))
+            frame.add_color(seen, camera=lens.camera, world_from_sensor=item.root_from_sensor, source=item.sensor)
         return frame

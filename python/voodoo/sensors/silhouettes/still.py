@@ -13,7 +13,7 @@ from voodoo.errors import MeasurementError
 from voodoo.measurements import ByteImage, DepthImage, FloatArray
 from voodoo.model.projection import CameraView
 from voodoo.sensors.depth import depth_points
-from voodoo.sensors.silhouettes.masks import Mask, filled, known_place, without_specks
+from voodoo.sensors.silhouettes.masks import Mask, filled, known_places, without_specks
 
 _STEP = 0.03
 """Two neighbors whose depths differ by more than this fraction lie on different objects."""
@@ -80,7 +80,7 @@ def from_depth(
         MeasurementError: a position is not three finite numbers, or the scene has another size.
     """
     height, width = depth.image.shape
-    places = {site: known_place(site, position) for site, position in known.items()}
+    places = known_places(known)
     points, valid = depth_points(depth)
     solid = valid.copy()
     solid[valid] = points[:, 2] > _FLOOR_M if level else True
@@ -124,6 +124,10 @@ def _connected(z: FloatArray, seeds: Sequence[tuple[int, int]]) -> Mask:
     return np.asarray(reached[1:-1, 1:-1] == 2, dtype=bool)
 
 
+_DIFFERENT, _COLORFUL = 30.0, 8.0
+"""Least difference of the foreground in any color channel, of 255; or in chroma (CIE 1976 a*, b*), which is independent of
+lightness: skin in the shade is as dark as a dark floor, but redder."""
+_SPECK_OF_COLOR_PX = 100
 _SMOOTH_PX = 1.5
 _INPAINT_PX = 5
 
@@ -137,33 +141,15 @@ class StillBackground:
         pictures: some tens of images spread over a recording, (H, W, 3) BGR uint8.
         occupied: for each image, (H, W) where the person may be; None: anywhere, so that the person must be absent from every
             pixel in more than half of the images.
-        threshold: least difference of the foreground in any color channel, 0 to 255.
-        chroma: least difference in chroma (CIE 1976 a*, b*), an alternative to `threshold` that is independent of lightness:
-            skin in the shade is as dark as a dark floor, but redder.
-        smallest: regions of less area are specks [px].
 
     Raises:
-        MeasurementError: no image, images or masks of different sizes, a number that cannot be used, or a person who may be
-            everywhere in all images.
+        MeasurementError: no image, images or masks of different sizes, or a person who may be everywhere in all images.
     """
 
-    def __init__(
-        self,
-        pictures: Sequence[ByteImage],
-        *,
-        occupied: Sequence[Mask] | None = None,
-        threshold: float = 30.0,
-        chroma: float = 8.0,
-        smallest: int = 100,
-    ) -> None:
+    def __init__(self, pictures: Sequence[ByteImage], *, occupied: Sequence[Mask] | None = None) -> None:
         """Learn the background; see the class."""
         if not pictures:
             raise MeasurementError("pictures: expected some, found none")
-        if not (0.0 < threshold < 255.0 and chroma > 0.0 and smallest > 0):
-            raise MeasurementError(
-                f"background: expected threshold 0 to 255, chroma and smallest > 0, found {threshold!r}, {chroma!r}, "
-                f"{smallest!r}"
-            )
         for picture in pictures:
             _check(picture, pictures[0].shape)
         if occupied is not None and [mask.shape for mask in occupied] != [picture.shape[:2] for picture in pictures]:
@@ -181,7 +167,7 @@ class StillBackground:
         hidden = self.unknown.astype(np.uint8)
         self._background = cv2.inpaint(np.nan_to_num(median).astype(np.uint8), hidden, _INPAINT_PX, cv2.INPAINT_TELEA)
         self._colors = _colors(np.asarray(self._background, dtype=np.uint8))
-        self._shape, self._threshold, self._chroma, self._smallest = pictures[0].shape, threshold, chroma, smallest
+        self._shape = pictures[0].shape
 
     def mask(self, picture: ByteImage) -> Mask:
         """(H, W): True where the picture differs from the background.
@@ -191,13 +177,13 @@ class StillBackground:
         """
         _check(picture, self._shape)
         smooth = _smooth(picture)
-        differs = cv2.absdiff(smooth, self._background).max(axis=2) > self._threshold
+        differs = cv2.absdiff(smooth, self._background).max(axis=2) > _DIFFERENT
         # The chroma threshold is low and smoothing spreads vivid colors by a pixel, so the mask is eroded.
-        colorful = np.linalg.norm(_colors(smooth) - self._colors, axis=2) > self._chroma
+        colorful = np.linalg.norm(_colors(smooth) - self._colors, axis=2) > _COLORFUL
         differs |= cv2.erode(colorful.astype(np.uint8), np.ones((3, 3), dtype=np.uint8)) != 0
         ellipse = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
         closed = cv2.morphologyEx(differs.astype(np.uint8), cv2.MORPH_CLOSE, ellipse)
-        return without_specks(np.asarray(closed != 0, dtype=bool), smallest=self._smallest)
+        return without_specks(np.asarray(closed != 0, dtype=bool), smallest=_SPECK_OF_COLOR_PX)
 
 
 def _check(image: ByteImage, shape: tuple[int, ...]) -> None:

@@ -10,12 +10,11 @@ import numpy.typing as npt
 
 import voodoo._core as _core
 from voodoo._core import Estimate
-from voodoo.errors import MeasurementError
-from voodoo.measurements import ByteImage, DepthImage, FloatArray
+from voodoo.errors import MeasurementError, of_kind
+from voodoo.measurements import ByteImage, ColorImage, DepthImage, FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.transforms import rigid
 from voodoo.people import Followed
-from voodoo.sensors.pixels import checked_camera
 from voodoo.sensors.rays import SiteRay
 from voodoo.sensors.skin.settings import SkinSettings
 from voodoo.tracker import Tracker
@@ -39,7 +38,6 @@ class SkinTracker:
             lost_gate=chosen.lost_gate,
             widest_gate=chosen.widest_gate,
         )
-        self._stamp = 0.0
         self._images = 0
 
     def __copy__(self) -> SkinTracker:
@@ -67,47 +65,37 @@ class SkinTracker:
 
     def observe(
         self,
-        image: ByteImage,
-        camera: Camera,
-        world_from_sensor: npt.ArrayLike,
+        item: ColorImage,
         predicted: Mapping[str, FloatArray],
         *,
-        stamp: float | None = None,
         depth: DepthImage | None = None,
         tracker: Tracker | Followed | None = None,
         others: Sequence[Followed] = (),
         head_visible: Collection[str] = (),
-        source: str = "skin",
         moved: Mapping[str, FloatArray] | None = None,
     ) -> list[SiteRay]:
         """Updates the cue with an image and returns a ray for each detected site.
 
         Args:
-            image: (H, W, 3) BGR uint8.
-            camera: calibration.
-            world_from_sensor: (4, 4).
-            predicted: site name -> (3,) in the world at the time of the picture; skin is searched for around them.
-            stamp: time of the image [s]; None: 1/30 s after the last.
+            item: the image.
+            predicted: site name -> (3,) in the root frame at the time of the image; skin is searched for around them.
             depth: image of a depth camera beside this one. With it, skin that is not at the body's distance is left out, and
                 a candidate has a position, not only a ray.
             tracker: the tracker of the body, with its last pose: what is on its trunk or its legs is no hand, if `depth` is
                 given.
             others: other persons; a region nearer to them than to the body belongs to them.
             head_visible: sites whose own limb is measured by other sensors, see `SkinSettings.visible_bias`.
-            source: name for `Estimate.sources`.
             moved: site name -> position (3,) at the time of the rays; None: the rays have the time of the image.
 
         Raises:
             MeasurementError: an image is not of its camera's size, or `tracker` has no pose yet.
         """
-        pose = rigid(world_from_sensor)
-        _check_image(image, camera)
-        self._stamp = self._stamp + 1.0 / 30.0 if stamp is None else stamp
+        camera, pose, image = item.camera, *_checked(item)
         beside = None if depth is None else (depth.image, depth.meters_per_unit, depth.camera, depth.root_from_sensor)
         found = self._cue.observe(
-            np.ascontiguousarray(image),
+            image,
             predicted,
-            stamp=self._stamp,
+            stamp=item.stamp,
             world_from_sensor=pose,
             camera=camera,
             depth=beside,
@@ -121,31 +109,22 @@ class SkinTracker:
             bias = self.settings.sites[site]
             if site in head_visible:
                 bias = max(bias, self.settings.visible_bias.get(site, bias))
-            ray = SiteRay(site, pose[:3, 3], direction, noise.sigma(z, focal), source, bias=bias, place=place)
+            ray = SiteRay(site, pose[:3, 3], direction, noise.sigma(z, focal), item.sensor, bias=bias, place=place)
             rays.append(ray if moved is None else ray.moved(moved[site] - predicted[site]))
         return rays
 
-    def learn(
-        self,
-        image: ByteImage,
-        camera: Camera,
-        world_from_sensor: npt.ArrayLike,
-        estimate: Estimate,
-        *,
-        trusted_start: bool = False,
-    ) -> None:
+    def learn(self, item: ColorImage, estimate: Estimate, *, trusted_start: bool = False) -> None:
         """Learn the colors of the face, if it was detected, from an image and the estimate at its time, if that is "tracking".
 
         Args:
-            image, camera, world_from_sensor: as in `observe`.
+            item: the image.
             estimate: the estimate at the time of the image.
             trusted_start: the pose was set by the user and is learned from whatever the status is.
 
         Raises:
             MeasurementError: the image is not of the camera's size.
         """
-        pose = rigid(world_from_sensor)
-        _check_image(image, camera)
+        pose, image = _checked(item)
         if estimate.status != "tracking" and not trusted_start:
             return
         self._images += 1
@@ -154,14 +133,20 @@ class SkinTracker:
             return
         names, positions = estimate.joint_names, np.ascontiguousarray(estimate.joint_positions)
         sites = np.array([positions[names.index(site)] if site in names else _NOWHERE for site in self._sites])
-        self._cue.learn(np.ascontiguousarray(image), positions, sites, world_from_sensor=pose, camera=camera)
+        self._cue.learn(image, positions, sites, world_from_sensor=pose, camera=item.camera)
 
 
-def _check_image(image: ByteImage, camera: Camera) -> None:
-    checked_camera(camera)
+def _checked(item: ColorImage) -> tuple[FloatArray, ByteImage]:
+    """The pose (4, 4) of the camera, and the image (H, W, 3).
+
+    Raises:
+        MeasurementError: the pose is not rigid, or the image is not of its camera's size.
+    """
+    camera, image = of_kind("camera", item.camera, Camera, MeasurementError), item.image
     if not isinstance(image, np.ndarray):
         raise MeasurementError(f"image: expected an array (H, W, 3) of uint8, found {type(image).__name__}")
     if image.shape != (camera.height, camera.width, 3) or image.dtype != np.uint8:
         raise MeasurementError(
             f"image: expected uint8 of shape {(camera.height, camera.width, 3)}, found {image.dtype} of {image.shape}"
         )
+    return rigid(item.root_from_sensor), np.ascontiguousarray(image)

@@ -71,15 +71,14 @@ class KeypointNetwork:
         known = {item.sensor for item in frame.measurements if isinstance(item, KeypointImage)}
         items: list[Measurement] = []
         for item in frame.measurements:
-            if isinstance(item, ColorImage) and f"{item.sensor}/keypoints" not in known:
-                try:
+            try:
+                if isinstance(item, ColorImage) and f"{item.sensor}/keypoints" not in known:
                     items.append(self.keypoints(item))
-                except RecordingError as error:
-                    if refused is None:
-                        raise
-                    refused(error)
-                    continue
-            items.append(item)
+                items.append(item)
+            except RecordingError as error:
+                if refused is None:
+                    raise
+                refused(error)
         return tuple(items)
 
 
