@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager, ExitStack
-from typing import Any
+from contextlib import ExitStack
+from typing import Any, TypeVar
+
+Self = TypeVar("Self", bound="SideOutput")
 
 
-class SideOutput(AbstractContextManager[Any]):
+class SideOutput:
     """An output of a `with` block that completes its files at the end, or removes them after a failure.
 
     Attributes:
@@ -26,6 +28,10 @@ class SideOutput(AbstractContextManager[Any]):
                 call(*what)
             except Exception as error:
                 self.failure = error
+
+    def __enter__(self: Self) -> Self:
+        """Enter the block."""
+        return self
 
     def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
         """Complete the files; after an error or a failure, remove them."""

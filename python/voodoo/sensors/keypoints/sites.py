@@ -257,19 +257,19 @@ class KeypointSensor:
         self,
         frame: Frame,
         keypoints: npt.ArrayLike,
-        **how: Any,  # noqa: ANN401 - of observe
+        *,
+        predicted: Mapping[str, FloatArray],
+        gate: SiteGate | None = None,
+        depth: DepthArray | None = None,
+        meters_per_unit: float = 0.001,
     ) -> KeypointReport:
         """Add the keypoints of one person in one image to a frame; for several cameras see `observe`.
-
-        Args:
-            frame: that the rays and points are added to.
-            keypoints: (K, 3), see site_pixels.
-            **how: predicted, gate, depth, meters_per_unit, before: see `observe`.
 
         Raises:
             MeasurementError: wrong shapes, or an unknown layout.
         """
-        report, rays, points = self.observe(keypoints, stamp=frame.stamp, **how)
+        how: dict[str, Any] = {"gate": gate, "depth": depth, "meters_per_unit": meters_per_unit}
+        report, rays, points = self.observe(keypoints, stamp=frame.stamp, predicted=predicted, **how)
         add_rays(frame, rays, model=self.model)
         for site, (position, sigma) in points.items():
             frame.add_position(site, position, weight=self.model.weight(sigma), source=self.source)
