@@ -4,11 +4,14 @@
 use super::{Detected, DetectedJoint};
 use crate::association::correspondence::{Correspondences, DetectedPair};
 use crate::body::Body;
-use crate::math::{Pose, Vec3, reset};
+use crate::math::{Points, Pose, Vec3, refill, reset};
 
 /// By how many times its own a detected joint's information grows where the pose deviates from the detection, see
 /// [`Detected::excess_deviation`]: a surface that is not the body's has hundreds of points.
 const EXCESS_GAIN: f64 = 5.0;
+
+/// Scale of the kernel of a point's distance from the limb that was detected, in standard deviations of the detected joints.
+const OWN_SIGMAS: f64 = 4.0;
 
 /// A detected joint of the body: its site, its position, world frame, its standard deviation along each axis, meters, and its
 /// information, 1/m^2.
@@ -35,16 +38,22 @@ impl Detected<'_> {
         (sum / count.max(1.0) - 1.0).clamp(0.0, 1.0)
     }
 
-    /// Writes the probability that each limb is visible: the largest of its detected joints; 1 where none was detected.
-    pub(crate) fn visible_limbs(&self, body: &Body, limbs: &mut Vec<f32>) {
-        reset(limbs, body.limbs().len(), f32::NAN);
+    /// Writes where the limbs were detected, for points in the working frame.
+    pub(crate) fn locate(&self, body: &Body, origin: Vec3, limbs: &mut DetectedLimbs) {
+        let DetectedLimbs { visible, bones } = limbs;
+        reset(visible, body.limbs().len(), None);
         for (site, joint) in self.on_sites() {
-            for limb in joined_limbs(body, site) {
-                // The larger of a number and `NAN` is the number.
-                limbs[limb] = limbs[limb].max(joint.visible as f32);
+            let limb = body.sites()[site].limb;
+            for limb in [Some(limb), body.parent(limb)].into_iter().flatten() {
+                visible[limb] = Some(visible[limb].unwrap_or_default().max(joint.visible));
             }
         }
-        limbs.iter_mut().filter(|visible| visible.is_nan()).for_each(|visible| *visible = 1.0);
+        let bone = |child: usize| {
+            let limb = body.parent(child)?;
+            let end = |limb| self.hangs_by(limb).map(|joint| (joint.position - origin, joint.sigma));
+            Some(DetectedBone { limb, ends: [end(limb)?, end(child)?] })
+        };
+        refill(bones, (0..body.limbs().len()).filter_map(bone));
     }
 
     /// Writes the joints to `joints`, for a body that is expected at these poses, working frame.
@@ -57,10 +66,49 @@ impl Detected<'_> {
     }
 }
 
-/// The limb of a joint's site and its parent, or twice the limb of the root.
-fn joined_limbs(body: &Body, site: usize) -> [usize; 2] {
-    let limb = body.sites()[site].limb;
-    [limb, body.parent(limb).unwrap_or(limb)]
+/// Where the limbs were detected; empty without a detection.
+#[derive(Debug, Default)]
+pub(crate) struct DetectedLimbs {
+    /// For each limb: the largest probability of its detected joints that they are visible; `None` without any.
+    visible: Vec<Option<f64>>,
+    bones: Vec<DetectedBone>,
+}
+
+/// The detected joints between a limb and its parent and between the limb and a child, working frame, with their standard
+/// deviations; meters.
+#[derive(Debug)]
+struct DetectedBone {
+    limb: usize,
+    ends: [(Vec3, f64); 2],
+}
+
+impl DetectedLimbs {
+    /// Weighs points, working frame, by the probability that they show a limb of this radius: points elsewhere, of furniture or
+    /// clothes, would hold or draw it.
+    pub(crate) fn weigh(&self, limb: usize, radius: f64, points: &Points, weights: &mut [f32]) {
+        let Some(visible) = self.visible.get(limb).copied().flatten() else { return };
+        for (index, weight) in weights.iter_mut().enumerate() {
+            let bones = self.bones.iter().filter(|bone| bone.limb == limb);
+            let beyond = bones.map(|bone| bone.beyond(radius, points.get(index))).reduce(f64::min).unwrap_or(0.0);
+            *weight *= (visible / (1.0 + (beyond / OWN_SIGMAS).powi(2)).powi(2)) as f32;
+        }
+    }
+
+    /// Forgets the detection.
+    pub(crate) fn clear(&mut self) {
+        self.visible.clear();
+        self.bones.clear();
+    }
+}
+
+impl DetectedBone {
+    /// How far a point is from the surface with this radius, in standard deviations; 0 inside.
+    fn beyond(&self, radius: f64, point: Vec3) -> f64 {
+        let [(from, first), (to, last)] = self.ends;
+        let (offset, along) = (point - from, to - from);
+        let share = (offset.dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        (offset.distance(share * along) - radius).max(0.0) / (first + share * (last - first))
+    }
 }
 
 impl Correspondences {
@@ -76,6 +124,7 @@ impl Correspondences {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
     use crate::detect::{Detection, JointMap};
@@ -103,16 +152,33 @@ mod tests {
     }
 
     #[test]
-    fn a_limb_is_as_visible_as_the_better_seen_of_its_joints() {
+    fn points_are_a_limbs_own_where_it_was_detected_as_far_as_it_is_visible() {
         let (model, poses) = standing();
         let body = &model.body;
         let names = ["l_shoulder", "l_elbow", "l_wrist"].map(String::from);
         let map = JointMap::new(body, &names, &[]);
-        let joint = |visible| Some(DetectedJoint { position: poses[0].translation, sigma: 0.1, visible });
-        let detection = Detection { joints: [0.9, 0.5, 0.25].map(joint).to_vec(), ..Detection::default() };
-        let mut limbs = Vec::new();
-        Detected { detection: &detection, map: &map }.visible_limbs(body, &mut limbs);
-        let of = |name| limbs[body.limbs().iter().position(|limb| limb.name == name).unwrap_or_default()];
-        assert_eq!(["l_upperarm", "l_forearm", "l_hand", "r_forearm"].map(of), [0.9, 0.5, 0.25, 1.0]);
+        let place = |name: &String| body.site_position(&poses, body.site_index(name).unwrap());
+        let joint = |(name, visible)| Some(DetectedJoint { position: place(name) + Vec3::X, sigma: 0.05, visible });
+        let joints = names.iter().zip([0.9, 0.5, 0.25]).map(joint).collect();
+        let detection = Detection { joints, ..Detection::default() };
+        let mut limbs = DetectedLimbs::default();
+        Detected { detection: &detection, map: &map }.locate(body, Vec3::X, &mut limbs);
+        const RADIUS: f64 = 0.04;
+        // The weight of a point beside the middle of a limb, beyond its surface by this distance.
+        let weight = |name: &str, beyond: f64| {
+            let limb = body.limbs().iter().position(|limb| limb.name == name).unwrap();
+            let middle = poses[limb] * (0.5 * body.limbs()[limb].shape.length() * Vec3::Z);
+            let aside = (RADIUS + beyond) * (poses[limb].rotation * Vec3::X);
+            let (mut points, mut weights) = (Points::default(), [1.0]);
+            points.push((middle + aside).to_array().map(|value| value as f32));
+            limbs.weigh(limb, RADIUS, &points, &mut weights);
+            f64::from(weights[0])
+        };
+        let near = |weight: f64, expected: f64| (weight - expected).abs() < 0.01;
+        for (name, visible) in [("l_upperarm", 0.9), ("l_forearm", 0.5)] {
+            assert!(near(weight(name, -0.01), visible) && near(weight(name, OWN_SIGMAS * 0.05), 0.25 * visible));
+        }
+        // Only one end of the hand was detected, none of the right arm.
+        assert!(near(weight("l_hand", 1.0), 0.25) && near(weight("r_forearm", 1.0), 1.0));
     }
 }

@@ -17,7 +17,7 @@ use crate::association::correspondence::{Correspondences, LimbMatches};
 use crate::association::visible_side::match_visible_side;
 use crate::body::{Body, Pair};
 use crate::config::Config;
-use crate::detect::{Detected, MeasuredJoint};
+use crate::detect::{Detected, DetectedLimbs, MeasuredJoint};
 use crate::error::TrackError;
 use crate::math::{Pose, Vec3, refill};
 use crate::regions;
@@ -37,11 +37,9 @@ pub(crate) struct Fit {
     correspondences: Correspondences,
     contours: Contours,
     regions: regions::ColorRegions,
-    /// Joints that a detector found in this frame.
+    /// Joints that a detector found in this frame, and where it found the limbs.
     detected: Vec<MeasuredJoint>,
-    /// Probability that each limb is visible, by the detection of this frame; empty without one. Points are a limb's own with it:
-    /// others, of furniture, would hold a hidden limb.
-    visible: Vec<f32>,
+    detected_limbs: DetectedLimbs,
     /// Variance of each limb's radius, square meters.
     radius_variances: Vec<f64>,
     band_weights: Vec<f64>,
@@ -59,7 +57,7 @@ impl Fit {
             contours: Contours::default(),
             regions: regions::ColorRegions::default(),
             detected: Vec::new(),
-            visible: Vec::new(),
+            detected_limbs: DetectedLimbs::default(),
             radius_variances: Vec::new(),
             band_weights: Vec::new(),
             threads: Threads::new(config)?,
@@ -70,7 +68,7 @@ impl Fit {
     pub(crate) fn set_detected(&mut self, detected: Option<Detected>, body: &Body, poses: &[Pose], origin: Vec3) {
         self.forget_detected();
         if let Some(detected) = detected {
-            detected.visible_limbs(body, &mut self.visible);
+            detected.locate(body, origin, &mut self.detected_limbs);
             detected.measure(body, poses, origin, &mut self.detected);
         }
     }
@@ -83,7 +81,7 @@ impl Fit {
     /// Forgets the detection: poses are compared by what the sensors measure.
     pub(crate) fn forget_detected(&mut self) {
         self.detected.clear();
-        self.visible.clear();
+        self.detected_limbs.clear();
     }
 
     /// Returns the solver's schedule for the loop.
@@ -273,16 +271,19 @@ impl Fit {
     /// call.
     fn match_surface(&mut self, context: Context, poses: &[Pose], gate: &Gate, anew: bool, visible_side: bool) {
         let Context { config, model, observation, .. } = context;
-        let Self { solver, assignment, correspondences, threads, visible, radius_variances, .. } = self;
+        let Self { solver, assignment, correspondences, threads, detected_limbs, radius_variances, .. } = self;
         let (assignment, limbs, candidates) = (&*assignment, model.body.limbs(), observation.candidates);
         let whole_body = solver.schedule(config).whole_body;
         correspondences.limbs.resize_with(poses.len(), LimbMatches::default);
         let work = |(index, matches): (usize, &mut LimbMatches)| {
             if anew {
                 assignment.sample_limb(index, candidates, config, matches);
-                if let Some(visible) = visible.get(index) {
-                    matches.base_weight.iter_mut().for_each(|weight| *weight *= visible);
-                }
+                detected_limbs.weigh(
+                    index,
+                    limbs[index].shape.max_radius(),
+                    &matches.measured,
+                    &mut matches.base_weight,
+                );
             }
             matches.radius_variance = radius_variances.get(index).copied().unwrap_or_default();
             match_limb(&limbs[index], &poses[index], gate.distance, whole_body, matches);

@@ -30,7 +30,7 @@ impl TaperedEllipticCylinder {
     /// Center and radius, meters, of a sphere around the solid in the frame `world`.
     pub(crate) fn sphere(&self, world_from_limb: &Pose) -> (Vec3, f64) {
         let half = 0.5 * self.length;
-        let radius = self.a0.max(self.a1).max(self.b0).max(self.b1);
+        let radius = self.max_radius();
         (*world_from_limb * (Vec3::Z * half), half.hypot(radius))
     }
 }

@@ -182,7 +182,7 @@ impl TaperedEllipticCylinder {
 
     /// The minimum of `g` between two angles by Newton's iteration with bisection; returns the best foot found.
     fn refine(&self, mut low: Angle, start: Angle, mut high: Angle, q: Vec3) -> Foot {
-        let scale = self.a0.max(self.a1).max(self.b0).max(self.b1);
+        let scale = self.max_radius();
         let mut foot = self.foot(start, q);
         let mut best = foot;
         let mut last_step = f64::INFINITY;

@@ -82,7 +82,7 @@ impl Constants {
         let origin = world_from_limb.translation.as_vec3();
         let rest = rotation.transpose() * (world_from_limb.translation - origin.as_dvec3());
         let cap = |a: f64, b: f64| [(a * a) as f32, (b * b) as f32, (a * a * b * b) as f32];
-        let size = shape.a0.max(shape.a1).max(shape.b0).max(shape.b1);
+        let size = shape.max_radius();
         // The flatter an ellipse, the larger the third derivative of g at its tips.
         let aspect =
             f64::max(shape.a0.max(shape.b0) / shape.a0.min(shape.b0), shape.a1.max(shape.b1) / shape.a1.min(shape.b1));

@@ -201,6 +201,11 @@ impl TaperedEllipticCylinder {
         (q.x * b).powi(2) + (q.y * a).powi(2) - (a * b).powi(2)
     }
 
+    /// The largest semi-axis, meters.
+    pub(crate) fn max_radius(&self) -> f64 {
+        self.a0.max(self.a1).max(self.b0).max(self.b1)
+    }
+
     /// The shape with its length and its semi-axes `(a0, b0, a1, b1)` multiplied by factors.
     pub(crate) fn stretched(&self, length: f64, [a0, b0, a1, b1]: [f64; 4]) -> Result<Self, ShapeError> {
         Self::new(self.length * length, self.a0 * a0, self.b0 * b0, self.a1 * a1, self.b1 * b1)
