@@ -6,7 +6,7 @@ use super::trials::Trials;
 use crate::body::Body;
 use crate::fit::{Context, Fit};
 use crate::hypotheses::SWIVELS;
-use crate::math::{Pose, Quat, Vec3};
+use crate::math::{Pose, Quat, Vec3, refill};
 use crate::observation::candidates::body_box;
 use crate::observation::segments::{Segment, Segments};
 
@@ -23,13 +23,7 @@ pub(super) struct SegmentSearch {
 impl SegmentSearch {
     /// Stores the poses of a tracked body.
     pub(super) fn remember(&mut self, poses: &[Pose]) {
-        self.tracked.clear();
-        self.tracked.extend_from_slice(poses);
-    }
-
-    /// Returns a segment by its index; the largest comes first.
-    pub(super) fn segment(&self, index: usize) -> Option<Segment> {
-        self.segments.found().get(index).copied()
+        refill(&mut self.tracked, poses.iter().copied());
     }
 
     /// Whether the longest side of a segment is between half and twice that of the body.
@@ -59,8 +53,7 @@ impl SegmentSearch {
         for turn in 0..SWIVELS {
             let turn = Quat::from_axis_angle(up, std::f64::consts::TAU * turn as f64 / SWIVELS as f64);
             let moved = Pose::from_parts(there - turn * middle, turn);
-            turned.clear();
-            turned.extend(tracked.iter().map(|pose| moved * *pose));
+            refill(turned, tracked.iter().map(|pose| moved * *pose));
             let stray = trials.stray_fraction(context, turned);
             // Of two rotations that explain equally many points, the smaller one is kept.
             if stray < least {
