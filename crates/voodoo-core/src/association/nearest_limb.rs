@@ -234,14 +234,14 @@ impl LimbBox {
         let to_f32 = |v: Vec3| v.to_array().map(|value| value as f32);
         let limb_from_working = working_from_limb.inverse();
         let shape = &limb.shape;
-        let bounds = shape.local_aabb();
+        let bounds = shape.local_aabb().enlarged(margin);
         let ends = [(shape.a0(), shape.b0()), (shape.a1(), shape.b1())];
         let ratio = |(a, b): (f64, f64)| a.min(b) / a.max(b).max(f64::MIN_POSITIVE);
         Self {
             axes: [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| to_f32(limb_from_working.rotation * axis)),
             shift: to_f32(limb_from_working.translation),
-            low: to_f32(bounds.mins - Vec3::splat(margin)),
-            high: to_f32(bounds.maxs + Vec3::splat(margin)),
+            low: to_f32(bounds.mins),
+            high: to_f32(bounds.maxs),
             length: shape.length() as f32,
             a: [shape.a0() as f32, ((shape.a1() - shape.a0()) / shape.length()) as f32],
             b: [shape.b0() as f32, ((shape.b1() - shape.b0()) / shape.length()) as f32],

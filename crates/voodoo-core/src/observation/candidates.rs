@@ -37,13 +37,8 @@ const ROUGH_POINTS: usize = 700;
 
 /// Box around the posed body, enlarged by `margin`, in the frame of `poses`.
 pub(crate) fn body_box(body: &Body, poses: &[Pose], margin: f64) -> Aabb {
-    let mut total = Aabb::EMPTY;
-    for (limb, pose) in body.limbs().iter().zip(poses) {
-        let bounds = limb.shape.aabb(pose);
-        total.mins = total.mins.min(bounds.mins);
-        total.maxs = total.maxs.max(bounds.maxs);
-    }
-    Aabb::new(total.mins - Vec3::splat(margin), total.maxs + Vec3::splat(margin))
+    let boxes = body.limbs().iter().zip(poses).map(|(limb, pose)| limb.shape.aabb(pose));
+    boxes.fold(Aabb::EMPTY, Aabb::union).enlarged(margin)
 }
 
 impl Candidates {

@@ -1,7 +1,7 @@
 //! Cuts the foreground of a frame into connected segments: each may be a lost body.
 
 use crate::config::Config;
-use crate::math::{Vec3, reset};
+use crate::math::{Aabb, Vec3, reset};
 use crate::observation::background::{Background, Backgrounds};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::frame::Frame;
@@ -20,10 +20,8 @@ const HALF_KEY: f64 = (1_u64 << 20) as f64;
 pub(crate) struct Segment {
     /// Centroid of the samples.
     pub center: Vec3,
-    /// Minimum corner of the bounding box.
-    pub low: Vec3,
-    /// Maximum corner of the bounding box.
-    pub high: Vec3,
+    /// Bounding box.
+    pub bounds: Aabb,
     /// Visible surface area, in patches.
     pub patches: f64,
 }
@@ -174,8 +172,7 @@ impl Segments {
             let first = self.first(index as u32) as usize;
             if first == index {
                 self.of_cell[index] = self.found.len() as u32;
-                let (low, high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-                self.found.push(Segment { center: Vec3::ZERO, low, high, patches: 0.0 });
+                self.found.push(Segment { center: Vec3::ZERO, bounds: Aabb::EMPTY, patches: 0.0 });
             }
             let segment = &mut self.found[self.of_cell[first] as usize];
             let (start, end) = self.cells[index].samples;
@@ -183,8 +180,7 @@ impl Segments {
                 let weight = f64::from(sample.weight);
                 let point = Vec3::from_array(sample.point.map(f64::from));
                 segment.center += weight * point;
-                segment.low = segment.low.min(point);
-                segment.high = segment.high.max(point);
+                segment.bounds = segment.bounds.union(Aabb::new(point, point));
                 segment.patches += weight;
             }
         }

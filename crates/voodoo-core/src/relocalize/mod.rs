@@ -136,12 +136,11 @@ impl Relocalizer {
         let origin = context.observation.origin();
         let Some(mut place) = fit_pose(&context.model.body, detected) else { return false };
         place.iter_mut().for_each(|pose| *pose = shifted(pose, origin));
-        let (low, high) = (detected.detection.low - origin, detected.detection.high - origin);
         let margin = context.config.body_box_margin;
-        let there = Aabb::new(low - Vec3::splat(margin), high + Vec3::splat(margin));
+        let there = Aabb::new(detected.detection.low - origin, detected.detection.high - origin).enlarged(margin);
         // Points that the present pose explains must not be left unexplained, unless the body is `lost` there.
         let here = if lost { there } else { body_box(&context.model.body, present, margin) };
-        let bounds = Aabb::new(there.mins.min(here.mins), there.maxs.max(here.maxs));
+        let bounds = there.union(here);
         // The detection is tried now, so another trial needs new evidence.
         self.check.elsewhere = 0.0;
         fit.swap_matches(&mut self.matched);
@@ -202,8 +201,7 @@ impl Relocalizer {
         let found = (0..self.search.segments.found().len()).any(|index| {
             let segment = self.search.segments.found()[index];
             self.search.is_body_sized(&context.model.body, segment) && {
-                let margin = Vec3::splat(context.config.body_box_margin);
-                let bounds = Aabb::new(segment.low - margin, segment.high + margin);
+                let bounds = segment.bounds.enlarged(context.config.body_box_margin);
                 self.candidates.gather(frame, origin, &bounds, backgrounds, context.config);
                 let observation = context.observation.with(&self.candidates);
                 let at = Context { observation, previous: &[], time_scale: UNKNOWN_MOTION, ..context };

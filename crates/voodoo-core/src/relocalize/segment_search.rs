@@ -29,7 +29,7 @@ impl SegmentSearch {
     /// Whether the longest side of a segment is between half and twice that of the body.
     pub(super) fn is_body_sized(&self, body: &Body, segment: Segment) -> bool {
         let length = body_box(body, &self.tracked, 0.0).extents().max_element();
-        let extent = (segment.high - segment.low).max_element();
+        let extent = segment.bounds.extents().max_element();
         extent > 0.5 * length && extent < 2.0 * length
     }
 
@@ -47,12 +47,11 @@ impl SegmentSearch {
         let stood = tracked.first().map_or(Vec3::Z, |root| root.rotation * Vec3::Z);
         let up = context.observation.frame().ground.map_or(stood, |ground| ground.normal);
         let middle = body_box(&context.model.body, tracked, 0.0).center();
-        let there = 0.5 * (segment.low + segment.high);
         best.clear();
         let mut least = f64::INFINITY;
         for turn in 0..SWIVELS {
             let turn = Quat::from_axis_angle(up, std::f64::consts::TAU * turn as f64 / SWIVELS as f64);
-            let moved = Pose::from_parts(there - turn * middle, turn);
+            let moved = Pose::from_parts(segment.bounds.center() - turn * middle, turn);
             refill(turned, tracked.iter().map(|pose| moved * *pose));
             let stray = trials.stray_fraction(context, turned);
             // Of two rotations that explain equally many points, the smaller one is kept.
