@@ -3,7 +3,7 @@
 use crate::body::Body;
 use crate::config::Config;
 use crate::math::{Aabb, Mat3, Points, Pose, Vec3, shifted, vectorized};
-use crate::observation::background::{Background, Backgrounds};
+use crate::observation::background::Backgrounds;
 use crate::observation::clusters::Clusters;
 use crate::observation::frame::{Cloud, DepthImage, Frame, Scope};
 use crate::observation::pixels::{Grid, PointGate, STRETCH, Stretch};
@@ -71,7 +71,7 @@ impl Candidates {
         let gate =
             PointGate { low: to_f32(bounds.mins), high: to_f32(bounds.maxs), up: to_f32(up), floor: floor as f32 };
         for image in frame.images {
-            let background = backgrounds.of_image(image).map_or(&[][..], Background::depth);
+            let background = backgrounds.depth(image);
             self.gather_image(image, background, origin, bounds, &gate, config.max_points);
             self.cameras.push((self.points.len() as u32, image.world_from_sensor.translation - origin));
         }
@@ -242,6 +242,7 @@ pub(super) fn columns_f32(pose: &Pose) -> [[f32; 3]; 4] {
 mod tests {
     use super::*;
     use crate::math::Quat;
+    use crate::observation::background::Background;
     use crate::observation::frame::{Ground, PointSlice};
     use crate::testing::image;
 

@@ -102,7 +102,7 @@ impl Segments {
 
     fn sample_images(&mut self, frame: &Frame, origin: Vec3, backgrounds: &Backgrounds) {
         for image in frame.images {
-            let background = backgrounds.of_image(image).map_or(&[][..], Background::depth);
+            let background = backgrounds.depth(image);
             let step = ((image.pixels.len() as f64 / SAMPLES_PER_SOURCE as f64).sqrt().ceil() as usize).max(1);
             let [fx, fy] = image.camera.focal();
             let spread = (step * step) as f64 / (fx * fy * REFERENCE_PATCH);

@@ -126,12 +126,10 @@ impl SceneModel {
 
     /// Whether most of these pixels of an image show the learned scene.
     pub(super) fn is_still(&self, frame: &Frame, image: usize, pixels: &[usize]) -> bool {
-        let Some((image, known)) = frame.images.get(image).and_then(|image| Some((image, self.known.of_image(image)?)))
-        else {
-            return false;
-        };
+        let Some(image) = frame.images.get(image) else { return false };
+        let known = self.known.depth(image);
         let still = |pixel: &&usize| {
-            let known = known.depth().get(**pixel).copied().unwrap_or(0.0);
+            let known = known.get(**pixel).copied().unwrap_or(0.0);
             meters(image, **pixel).is_some_and(|z| Background::contains(known, z))
         };
         2 * pixels.iter().filter(still).count() > pixels.len()
@@ -223,8 +221,7 @@ mod tests {
             (0..3).for_each(|frame| feed(&mut scene, 5000, frame, |_, _| ()));
             feed(&mut scene, came, 3, |scene, frame| {
                 scene.release(frame, 0, &[7]);
-                let known = scene.known().of_image(&frame.images[0]).map(|known| [known.depth()[7], known.depth()[8]]);
-                assert_eq!(known, Some([left, 5.0]));
+                assert_eq!(scene.known().depth(&frame.images[0])[7..9], [left, 5.0]);
             });
         }
     }
