@@ -161,9 +161,9 @@ impl ColorRegions {
     /// Returns an error for images with distortion, and for those that cannot be compared with the empty scene.
     pub(crate) fn check(&self, frame: &Frame) -> Result<(), TrackError> {
         for (index, picture) in frame.colors.iter().enumerate() {
-            let (what, found) = (|| format!("color[{index}].camera"), || format!("{:?}", picture.camera.lens()));
             let expected = "a pinhole camera: take the distortion out of the picture";
-            TrackError::unless(!picture.camera.distorts(), what, expected, found)?;
+            let (what, lens) = (format_args!("color[{index}].camera"), picture.camera.lens());
+            TrackError::unless(!picture.camera.distorts(), what, expected, format_args!("{lens:?}"))?;
             let known = self.cameras.iter().find(|camera| camera.number == picture.number);
             known.and_then(|camera| camera.scene.as_ref()).map_or(Ok(()), |scene| scene.check(picture, index))?;
         }

@@ -112,11 +112,11 @@ impl Rendering {
         view: &Viewpoint,
         pool: Option<&rayon::ThreadPool>,
     ) -> Result<(), TrackError> {
-        check_pose(|| "world_from_sensor".into(), &view.world_from_sensor)?;
+        check_pose("world_from_sensor", &view.world_from_sensor)?;
         let [poses, limbs] = [world_from_limb.len(), body.limbs().len()];
-        let found = || format!("{poses} poses for {limbs} limbs, or one not finite");
+        let found = format_args!("{poses} poses for {limbs} limbs, or one not finite");
         let valid = poses == limbs && world_from_limb.iter().all(is_rigid);
-        TrackError::unless(valid, || "world_from_limb".into(), "one rigid pose a limb", found)?;
+        TrackError::unless(valid, "world_from_limb", "one rigid pose a limb", found)?;
         let Self { width, depth, limb, raycasters } = self;
         *width = view.camera.width();
         reset(depth, view.camera.pixels(), 0.0);
