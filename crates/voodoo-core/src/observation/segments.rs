@@ -2,9 +2,9 @@
 
 use crate::config::Config;
 use crate::math::{Aabb, Vec3, reset};
-use crate::observation::background::{Background, Backgrounds};
+use crate::observation::background::Background;
 use crate::observation::candidates::REFERENCE_PATCH;
-use crate::observation::frame::Frame;
+use crate::observation::depth_view::{DepthView, DepthViews};
 
 /// Approximate number of samples per source: a search runs while the body is lost, and must keep up with the frame rate.
 const SAMPLES_PER_SOURCE: usize = 5000;
@@ -57,10 +57,11 @@ impl Segments {
         &self.found
     }
 
-    /// Segments a whole frame. `origin` is the working frame's origin in the world.
-    pub(crate) fn find(&mut self, frame: &Frame, origin: Vec3, backgrounds: &Backgrounds, config: &Config) {
+    /// Segments a whole frame.
+    pub(crate) fn find(&mut self, views: DepthViews, config: &Config) {
+        let DepthViews { frame, origin, .. } = views;
         self.samples.clear();
-        self.sample_images(frame, origin, backgrounds);
+        self.sample_images(views);
         for cloud in frame.clouds {
             let step = cloud.points.len().div_ceil(SAMPLES_PER_SOURCE).max(1);
             for index in (0..cloud.points.len()).step_by(step) {
@@ -100,9 +101,8 @@ impl Segments {
         self.samples.push(Sample { key, point, weight: weight as f32 });
     }
 
-    fn sample_images(&mut self, frame: &Frame, origin: Vec3, backgrounds: &Backgrounds) {
-        for image in frame.images {
-            let background = backgrounds.depth(image);
+    fn sample_images(&mut self, views: DepthViews) {
+        for DepthView { image, background, .. } in views.iter() {
             let step = ((image.pixels.len() as f64 / SAMPLES_PER_SOURCE as f64).sqrt().ceil() as usize).max(1);
             let [fx, fy] = image.camera.focal();
             let spread = (step * step) as f64 / (fx * fy * REFERENCE_PATCH);
@@ -113,7 +113,7 @@ impl Segments {
                     if !returned || background.get(pixel).is_some_and(|depth| Background::contains(*depth, z)) {
                         continue;
                     }
-                    let point = image.world_from_sensor * image.back_project(pixel, z) - origin;
+                    let point = image.world_from_sensor * image.back_project(pixel, z) - views.origin;
                     self.push(point, image.weight * spread * f64::from(z * z));
                 }
             }
@@ -202,7 +202,9 @@ fn order(a: &[f64; 3], b: &[f64; 3]) -> std::cmp::Ordering {
 mod tests {
     use super::*;
     use crate::math::Pose;
-    use crate::observation::frame::{Cloud, PointSlice, Scope};
+    use crate::observation::background::Backgrounds;
+    use crate::observation::frame::{Cloud, Frame, PointSlice, Scope};
+    use crate::testing::views;
 
     #[test]
     fn points_apart_are_segments_largest_first_and_strays_are_none() {
@@ -223,7 +225,7 @@ mod tests {
             }];
             let frame = Frame { clouds: &clouds, ..Frame::empty(0.0) };
             let mut segments = Segments::default();
-            segments.find(&frame, Vec3::ZERO, &Backgrounds::default(), &Config::default());
+            segments.find(views(&frame, &Backgrounds::default()), &Config::default());
             found.push(segments.found().to_vec());
             // A different order of the same points gives bitwise identical segments.
             points.reverse();

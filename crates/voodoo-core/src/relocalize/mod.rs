@@ -144,13 +144,7 @@ impl Relocalizer {
         // The detection is tried now, so another trial needs new evidence.
         self.check.elsewhere = 0.0;
         fit.swap_matches(&mut self.matched);
-        self.candidates.gather(
-            context.observation.frame(),
-            origin,
-            &bounds,
-            context.observation.views.backgrounds,
-            context.config,
-        );
+        self.candidates.gather(context.observation.views, &bounds, context.config);
         let observation = context.observation.with(&self.candidates);
         // Before its first frame the body is where it was set, and what is beside it may be scene.
         let first = context.previous.is_empty();
@@ -191,18 +185,17 @@ impl Relocalizer {
     /// Searches for a lost body that the detector cannot find. Returns whether it explains the frame better there than at
     /// `present`. The matches of `fit` are restored before it returns.
     pub(crate) fn search(&mut self, context: Context, fit: &mut Fit, present: &[Pose]) -> bool {
-        let (frame, origin) = (context.observation.frame(), context.observation.origin());
-        if self.frames_searched().is_none() || self.can_detect() && !frame.images.is_empty() {
+        let views = context.observation.views;
+        if self.frames_searched().is_none() || self.can_detect() && !views.frame.images.is_empty() {
             return false;
         }
-        let backgrounds = context.observation.views.backgrounds;
-        self.search.segments.find(frame, origin, backgrounds, context.config);
+        self.search.segments.find(views, context.config);
         fit.swap_matches(&mut self.matched);
         let found = (0..self.search.segments.found().len()).any(|index| {
             let segment = self.search.segments.found()[index];
             self.search.is_body_sized(&context.model.body, segment) && {
                 let bounds = segment.bounds.enlarged(context.config.body_box_margin);
-                self.candidates.gather(frame, origin, &bounds, backgrounds, context.config);
+                self.candidates.gather(views, &bounds, context.config);
                 let observation = context.observation.with(&self.candidates);
                 let at = Context { observation, previous: &[], time_scale: UNKNOWN_MOTION, ..context };
                 self.search.try_segment(segment, at, fit, &mut self.trials, present)
