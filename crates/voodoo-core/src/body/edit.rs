@@ -49,19 +49,12 @@ impl Body {
     /// b0, a1, b1) by `axes`. The limb frame moves with the surface; joints and sites stay at their world positions. Does nothing
     /// if the result would not be a valid solid.
     pub(crate) fn change_girth(&mut self, limb: usize, shift: Vec3, axes: [f64; 4]) -> bool {
-        let shape = self.limbs[limb].shape;
-        let Ok(shape) = shape.stretched(1.0, axes) else { return false };
-        self.limbs[limb].shape = shape;
-        self.map_landmarks(limb, |position| position - shift);
-        true
+        self.reshape(limb, 1.0, axes, |position| position - shift)
     }
 
     /// Lengthens the surface of a limb by a factor; joints and sites stay. Does nothing if the result would not be a valid solid.
     pub(crate) fn change_tip(&mut self, limb: usize, factor: f64) {
-        let shape = self.limbs[limb].shape;
-        if let Ok(shape) = shape.stretched(factor, [1.0; 4]) {
-            self.limbs[limb].shape = shape;
-        }
+        self.reshape(limb, factor, [1.0; 4], |position| position);
     }
 
     /// Limbs that have children, grouped into left-right pairs of equal length.
@@ -79,10 +72,15 @@ impl Body {
 
     /// Lengthens a limb by a factor, with everything fixed to it. Does nothing if the result would not be a valid solid.
     pub(crate) fn change_length(&mut self, limb: usize, factor: f64) -> bool {
-        let shape = self.limbs[limb].shape;
-        let Ok(shape) = shape.stretched(factor, [1.0; 4]) else { return false };
+        self.reshape(limb, factor, [1.0; 4], |position| position * Vec3::new(1.0, 1.0, factor))
+    }
+
+    /// Multiplies the length and the semi-axes (a0, b0, a1, b1) of a limb by factors, and replaces the positions of everything fixed
+    /// to it. Does nothing and returns false if the result would not be a valid solid.
+    pub(super) fn reshape(&mut self, limb: usize, length: f64, axes: [f64; 4], map: impl Fn(Vec3) -> Vec3) -> bool {
+        let Ok(shape) = self.limbs[limb].shape.stretched(length, axes) else { return false };
         self.limbs[limb].shape = shape;
-        self.map_landmarks(limb, |position| position * Vec3::new(1.0, 1.0, factor));
+        self.map_landmarks(limb, map);
         true
     }
 

@@ -37,10 +37,7 @@ impl Body {
                 LimbRole::UpperArm(_) | LimbRole::Forearm(_) | LimbRole::Hand(_) => (arm, girth),
                 LimbRole::Thigh(_) | LimbRole::Calf(_) | LimbRole::Foot(_) => (leg, girth),
             };
-            if let Ok(shape) = body.limbs[limb].shape.stretched(size, [size * girth; 4]) {
-                body.limbs[limb].shape = shape;
-                body.map_landmarks(limb, |position| position * size);
-            }
+            body.reshape(limb, size, [size * girth; 4], |position| position * size);
         }
         body
     }
