@@ -150,6 +150,13 @@ impl Body {
         limbs.filter_map(|(limb, part)| part.parent.as_ref().map(|(parent, joint)| (limb, *parent, joint)))
     }
 
+    /// Pairs of a clavicle and the upper arm that it carries. Other limbs that a user attached to a clavicle are not arms.
+    pub(crate) fn clavicles(&self) -> impl Iterator<Item = [usize; 2]> {
+        let is_arm = |limb| matches!(self.roles.joint(limb), Some(JointRole::Shoulder(_)));
+        let arms = self.joints().filter(move |(limb, parent, _)| is_arm(*limb) && self.roles.is_clavicle(*parent));
+        arms.map(|(limb, parent, _)| [parent, limb])
+    }
+
     /// The children of a limb.
     pub fn children(&self, limb: usize) -> impl Iterator<Item = usize> + '_ {
         (0..self.limbs.len()).filter(move |other| self.parent(*other) == Some(limb))
