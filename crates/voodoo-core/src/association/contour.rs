@@ -274,8 +274,8 @@ mod tests {
         let limb_from_camera = pose.inverse();
         let depth = |index: usize| {
             let ray = camera.back_project(index, 1.0);
-            let hit = shape.cast_ray(limb_from_camera.translation, limb_from_camera.rotation * ray, f64::INFINITY);
-            hit.map_or(0.0, |hit| (hit.distance / ray.length()) as f32)
+            let hit = shape.cast_ray(limb_from_camera.translation, limb_from_camera.rotation * ray);
+            hit.map_or(0.0, |distance| (distance / ray.length()) as f32)
         };
         (0..WIDTH * WIDTH).map(depth).collect()
     }

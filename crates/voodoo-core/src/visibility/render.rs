@@ -217,8 +217,7 @@ impl LimbRaycaster {
 
     fn intersect_exactly(&self, x: f64, y: f64) -> f64 {
         let direction = self.axes[0] * x + self.axes[1] * y + self.axes[2];
-        let hit = self.shape.cast_ray(self.origin, direction, f64::INFINITY);
-        hit.map_or(f64::NAN, |hit| hit.distance / direction.length())
+        self.shape.cast_ray(self.origin, direction).map_or(f64::NAN, |distance| distance / direction.length())
     }
 
     /// Returns the columns of a row that the limb can cover; all of them where the lens may bend straight lines.
