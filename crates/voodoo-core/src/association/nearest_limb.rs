@@ -37,15 +37,10 @@ impl NearestLimb {
     /// Sets the limb poses, with the boxes enlarged by `margin`. `buried` limbs contain no point; an empty slice means that none
     /// is buried.
     pub(crate) fn place(&mut self, body: &Body, poses: &[Pose], margin: f64, buried: &[bool]) {
-        self.limbs.clear();
-        self.limbs.extend(body.limbs().iter().zip(poses).enumerate().map(|(index, (limb, pose))| {
-            let open = LimbBox::new(limb, pose, margin);
-            if buried.get(index) == Some(&true) {
-                LimbBox { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3], ..open }
-            } else {
-                open
-            }
-        }));
+        refill(&mut self.limbs, body.limbs().iter().zip(poses).map(|(limb, pose)| LimbBox::new(limb, pose, margin)));
+        for (limb, _) in self.limbs.iter_mut().zip(buried).filter(|(_, buried)| **buried) {
+            (limb.low, limb.high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        }
         refill(&mut self.groups, self.limbs.chunks(LANES).map(Group::new));
     }
 

@@ -190,14 +190,9 @@ impl Body {
     /// The limb whose surface is nearest to a point (approximately, see [`TaperedEllipticCylinder::approximate_distance`]); the
     /// first of equals.
     pub(crate) fn closest_limb(&self, world_from_limb: &[Pose], point: Vec3) -> usize {
-        let (mut closest, mut least) = (0, f64::INFINITY);
-        for (index, (limb, pose)) in self.limbs.iter().zip(world_from_limb).enumerate() {
-            let distance = limb.shape.approximate_distance(pose.inverse_transform_point(point));
-            if distance < least {
-                (closest, least) = (index, distance);
-            }
-        }
-        closest
+        let limbs = self.limbs.iter().zip(world_from_limb);
+        let distances = limbs.map(|(limb, pose)| limb.shape.approximate_distance(pose.inverse_transform_point(point)));
+        distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(closest, _)| closest)
     }
 
     fn check(&self) -> Result<(), BodyError> {

@@ -188,11 +188,8 @@ impl Roles {
         }
         for site in sites {
             if JointRole::from_name(&site.name).is_some() && opposite(site.limb, &site.name) {
-                return Err(BodyError::value(
-                    format!("sites.{}.limb", site.name),
-                    "a limb of the site's own side",
-                    limbs[site.limb].name.clone(),
-                ));
+                let (key, found) = (format!("sites.{}.limb", site.name), &limbs[site.limb].name);
+                return Err(BodyError::value(key, "a limb of the site's own side", found));
             }
         }
         Ok(())

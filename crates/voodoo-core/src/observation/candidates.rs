@@ -169,7 +169,7 @@ impl Candidates {
     }
 
     fn gather_image(&mut self, view: &DepthView, bounds: &Aabb, gate: &PointGate, max_points: usize) {
-        let DepthView { image, background, working_from_camera, .. } = *view;
+        let DepthView { image, working_from_camera, .. } = *view;
         let [columns, rows] = image_window(image, &working_from_camera, bounds);
         let m = columns_f32(&working_from_camera);
         let points = &mut self.points;
@@ -186,7 +186,7 @@ impl Candidates {
                 let offset = grid.offset(row);
                 let first = (columns.start + stride - offset).next_multiple_of(stride) - stride + offset;
                 for start in (first..columns.end).step_by(STRETCH * stride) {
-                    let stretch = Stretch::load(image, background, row, start, columns.end, stride);
+                    let stretch = Stretch::load(view, row, start..columns.end, stride);
                     if stretch.returned() {
                         stretch.gather(&m, gate, points);
                     }

@@ -1,7 +1,7 @@
 //! What the pixels of a depth image show at a position in space.
 
 use crate::camera::NEAREST_RETURN;
-use crate::math::{Pose, Vec3, shifted};
+use crate::math::{Pose, Vec3, refill, shifted};
 use crate::observation::background::{Background, Backgrounds, OTHERS};
 use crate::observation::frame::{DepthImage, Frame};
 
@@ -149,15 +149,12 @@ pub(crate) struct Shares {
 
 /// Finds in which images of a frame the body was segmented, and writes the result to `found`.
 pub(crate) fn find_segmented(frame: &Frame, found: &mut Vec<bool>) {
-    found.clear();
-    found.extend(frame.images.iter().map(|image| {
-        let (mut none, mut all) = (0_u32, 0_u32);
-        for index in (0..image.pixels.len()).step_by(SEGMENTED_STEP) {
-            all += 1;
-            none += u32::from(image.pixels.get(index) <= 0.0);
-        }
-        f64::from(none) > SEGMENTED_FRACTION * f64::from(all)
-    }));
+    let is_segmented = |image: &DepthImage| {
+        let tested = (0..image.pixels.len()).step_by(SEGMENTED_STEP);
+        let none = tested.clone().filter(|index| image.pixels.get(*index) <= 0.0).count();
+        none as f64 > SEGMENTED_FRACTION * tested.len() as f64
+    };
+    refill(found, frame.images.iter().map(is_segmented));
 }
 
 #[cfg(test)]

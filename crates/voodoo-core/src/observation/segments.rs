@@ -123,15 +123,11 @@ impl Segments {
     fn fill_cells(&mut self) {
         self.cells.clear();
         let mut start = 0;
-        for end in 1..=self.samples.len() {
-            if end < self.samples.len() && self.samples[end].key == self.samples[start].key {
-                continue;
-            }
-            let weight: f32 = self.samples[start..end].iter().map(|sample| sample.weight).sum();
-            if weight >= LEAST_PATCHES {
+        for samples in self.samples.chunk_by(|a, b| a.key == b.key) {
+            let end = start + samples.len() as u32;
+            if samples.iter().map(|sample| sample.weight).sum::<f32>() >= LEAST_PATCHES {
                 let parent = self.cells.len() as u32;
-                let samples = (start as u32, end as u32);
-                self.cells.push(Cell { key: self.samples[start].key, samples, parent });
+                self.cells.push(Cell { key: samples[0].key, samples: (start, end), parent });
             }
             start = end;
         }
