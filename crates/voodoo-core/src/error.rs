@@ -67,6 +67,16 @@ impl BodyError {
     pub fn value(key: impl Into<String>, expected: &'static str, found: impl Into<String>) -> Self {
         Self::Value { key: key.into(), expected, found: found.into() }
     }
+
+    /// Rejects a value that is not valid; the texts are made only then.
+    pub(crate) fn unless(
+        valid: bool,
+        key: impl Display,
+        expected: &'static str,
+        found: impl Display,
+    ) -> Result<(), Self> {
+        if valid { Ok(()) } else { Err(Self::value(key.to_string(), expected, found.to_string())) }
+    }
 }
 
 /// An invalid camera calibration.

@@ -11,9 +11,7 @@ pub(crate) type Pair = Vec<usize>;
 impl Body {
     /// The body with all lengths multiplied by `factor`.
     pub fn scaled(&self, factor: f64) -> Result<Self, BodyError> {
-        if !factor.is_finite() || factor <= 0.0 {
-            return Err(BodyError::value("factor", "a finite factor above zero", factor.to_string()));
-        }
+        BodyError::unless(factor.is_finite() && factor > 0.0, "factor", "a finite factor above zero", factor)?;
         let scale_pose = |pose: &Pose| Pose::from_parts(pose.translation * factor, pose.rotation);
         let mut body = self.clone();
         for limb in &mut body.limbs {
@@ -104,9 +102,7 @@ impl Body {
     /// The body without a limb, its sites and its descendants, and the indices of the remaining limbs.
     pub fn without_limb(&self, name: &str) -> Result<(Self, Vec<usize>), BodyError> {
         let removed = self.limb_index(name)?;
-        if removed == 0 {
-            return Err(BodyError::value("limb", "a limb other than the root", name));
-        }
+        BodyError::unless(removed > 0, "limb", "a limb other than the root", name)?;
         let mut new_index: Vec<Option<usize>> = Vec::with_capacity(self.limbs.len());
         let mut kept = Vec::new();
         for (index, limb) in self.limbs.iter().enumerate() {
