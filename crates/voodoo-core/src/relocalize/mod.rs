@@ -160,7 +160,7 @@ impl Relocalizer {
 
     /// The poses that a detection or the search found last, working frame.
     pub(crate) fn found(&self) -> &[Pose] {
-        self.trials.poses()
+        &self.trials.poses
     }
 
     /// Returns for how many frames the lost body has been searched: the count starts at the frame from which on a loss is not

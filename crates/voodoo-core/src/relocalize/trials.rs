@@ -19,17 +19,12 @@ pub(super) struct Trials {
     sample: WeightedPoints,
     nearest: Vec<f32>,
     distances: Vec<f32>,
-    /// The poses under trial, and their start.
-    poses: Vec<Pose>,
+    /// The poses of the last trial, and their start.
+    pub(super) poses: Vec<Pose>,
     predicted: Vec<Pose>,
 }
 
 impl Trials {
-    /// Returns the poses of the last trial.
-    pub(super) fn poses(&self) -> &[Pose] {
-        &self.poses
-    }
-
     /// Tries the body at the poses `place`. Returns whether it explains the points there better than the present pose does.
     pub(super) fn try_at(&mut self, context: Context, fit: &mut Fit, present: &[Pose], place: &[Pose]) -> bool {
         fit.match_all(context, present, context.config.max_steps);

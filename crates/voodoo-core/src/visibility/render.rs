@@ -205,8 +205,13 @@ impl LimbRaycaster {
     #[inline(always)]
     pub(crate) fn depth_at(&self, x: f64, y: f64) -> f64 {
         // Most rays do not come near most limbs.
-        let near = (x >= self.low[0]) & (x <= self.high[0]) & (y >= self.low[1]) & (y <= self.high[1]);
-        if near { self.depth_within(x, y) } else { f64::NAN }
+        if self.is_near(x, y) { self.depth_within(x, y) } else { f64::NAN }
+    }
+
+    /// Whether the ray through `(x / z, y / z)` may meet the limb.
+    #[inline(always)]
+    fn is_near(&self, x: f64, y: f64) -> bool {
+        (x >= self.low[0]) & (x <= self.high[0]) & (y >= self.low[1]) & (y <= self.high[1])
     }
 
     #[inline(never)]
@@ -262,14 +267,7 @@ impl LimbRaycaster {
             let (first, end) = self.span(view.camera, row);
             for start in (first..end).step_by(LANES) {
                 let (x, y) = view.lanes(row, start);
-                let mut near = false;
-                for lane in 0..LANES {
-                    near |= (x[lane] >= self.low[0])
-                        & (x[lane] <= self.high[0])
-                        & (y[lane] >= self.low[1])
-                        & (y[lane] <= self.high[1]);
-                }
-                if !near {
+                if !(0..LANES).fold(false, |near, lane| near | self.is_near(x[lane], y[lane])) {
                     continue;
                 }
                 let found = self.intersect(&x, &y);
