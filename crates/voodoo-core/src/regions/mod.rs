@@ -235,17 +235,17 @@ impl ColorRegions {
             edges.reserve(lines.capacity());
             pairs.reserve(lines.capacity());
             for line in lines {
-                let searched = is_requested.is_none_or(|is_requested| is_requested(usize::from(line.limb)));
+                let limb = usize::from(line.limb);
+                let searched = is_requested.is_none_or(|is_requested| is_requested(limb));
                 let found = if searched { scan::edge_on(&view, line, search, together) } else { None };
                 edges.push(found);
                 if together {
-                    let length = posed.body.limbs()[usize::from(line.limb)].shape.length();
-                    evidence[usize::from(line.limb)].take(line.foot.z / length, found.map(|found| found.beside));
+                    let length = posed.body.limbs()[limb].shape.length();
+                    evidence[limb].take(line.foot.z / length, found.map(|found| found.beside));
                 }
                 let Some(edge) = found.map(|found| found.edge).filter(|edge| edge.information > 0.0) else { continue };
                 let motion = line.motion / f64::from(unit);
                 let slope = motion.length();
-                let limb = usize::from(line.limb);
                 pairs.push(RegionPair {
                     limb,
                     x: posed.poses[limb] * line.foot,
