@@ -103,25 +103,16 @@ impl Body {
     pub fn without_limb(&self, name: &str) -> Result<(Self, Vec<usize>), BodyError> {
         let removed = self.limb_index(name)?;
         BodyError::unless(removed > 0, "limb", "a limb other than the root", name)?;
-        let mut new_index: Vec<Option<usize>> = Vec::with_capacity(self.limbs.len());
-        let mut kept = Vec::new();
-        for (index, limb) in self.limbs.iter().enumerate() {
-            let stays = index != removed && limb.parent.as_ref().is_none_or(|(parent, _)| new_index[*parent].is_some());
-            new_index.push(stays.then_some(kept.len()));
-            if stays {
-                kept.push(index);
-            }
-        }
-        let limbs = kept
-            .iter()
-            .map(|index| {
-                let mut limb = self.limbs[*index].clone();
-                limb.parent = limb.parent.and_then(|(parent, joint)| Some((new_index[parent]?, joint)));
-                limb
-            })
-            .collect();
-        let sites =
-            self.sites.iter().filter_map(|site| Some(Site { limb: new_index[site.limb]?, ..site.clone() })).collect();
+        let stays =
+            |limb: &usize| !std::iter::successors(Some(*limb), |limb| self.parent(*limb)).any(|up| up == removed);
+        let kept: Vec<usize> = (0..self.limbs.len()).filter(stays).collect();
+        let new_index = |limb: usize| kept.binary_search(&limb).ok();
+        let limb = |index: &usize| {
+            let limb = self.limbs[*index].clone();
+            Limb { parent: limb.parent.and_then(|(parent, joint)| Some((new_index(parent)?, joint))), ..limb }
+        };
+        let site = |site: &Site| Some(Site { limb: new_index(site.limb)?, ..site.clone() });
+        let (limbs, sites) = (kept.iter().map(limb).collect(), self.sites.iter().filter_map(site).collect());
         Ok((Self::new(self.name.clone(), limbs, sites)?, kept))
     }
 

@@ -18,7 +18,6 @@ mod segment;
 
 use crate::association::correspondence::{Correspondences, RegionPair};
 use crate::body::Body;
-use crate::camera::Camera;
 use crate::error::TrackError;
 use crate::math::{Pose, Vec3, refill, reset, shifted};
 use crate::observation::frame::Frame;
@@ -298,7 +297,8 @@ impl ColorRegions {
         let camera_from_limb = self.camera_from_limb(frame, picture, posed);
         let camera = self.camera(picture.number);
         refill(&mut camera.camera_from_limb, (0..posed.poses.len()).map(camera_from_limb));
-        camera.unit = unit_of(picture.camera);
+        let [fx, fy] = picture.camera.focal();
+        camera.unit = (0.5 * (fx + fy) / FOCAL) as f32;
         let (body, Learned { unit, labels, lines, camera_from_limb, .. }) = (posed.body, camera);
         labels.draw(body, camera_from_limb, picture.camera, CELL_BITS, |_| true);
         lines.clear();
@@ -335,10 +335,4 @@ impl Learned {
     fn view<'a>(&'a self, picture: &'a ColorImage, labels: &'a LimbLabels, groups: &'a [u16]) -> ScanView<'a> {
         ScanView { picture, model: &self.model, labels, scene: self.scene.as_ref(), groups, unit: self.unit }
     }
-}
-
-/// Pixels per unit.
-fn unit_of(camera: &Camera) -> f32 {
-    let [fx, fy] = camera.focal();
-    (0.5 * (fx + fy) / FOCAL) as f32
 }

@@ -65,12 +65,6 @@ impl Relocalizer {
         self.search.remember(poses);
     }
 
-    /// Records how the track was started: `auto_initialized` by the detector, or by the user.
-    pub(crate) fn record_start(&mut self, auto_initialized: bool) {
-        self.check.auto_initialized = auto_initialized;
-        self.keep_floor(auto_initialized);
-    }
-
     /// Returns the floor that the detector found under an auto-initialized body, world frame. It is used where the ground plane
     /// is not given.
     pub(crate) fn floor(&self) -> Option<Ground> {

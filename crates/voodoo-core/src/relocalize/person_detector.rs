@@ -68,9 +68,10 @@ impl Relocalizer {
         Own { image: self.image, pixels }
     }
 
-    /// Stores the floor under the detection if the track was `found` by the detector; clears it otherwise.
-    pub(super) fn keep_floor(&mut self, found: bool) {
-        self.floor = self.detected().filter(|_| found).and_then(floor_under);
+    /// Records how the track was started: `auto_initialized` by the detector, whose detection tells the floor, or by the user.
+    pub(crate) fn record_start(&mut self, auto_initialized: bool) {
+        self.check.auto_initialized = auto_initialized;
+        self.floor = self.detected().filter(|_| auto_initialized).and_then(floor_under);
     }
 
     /// Runs the detector on the owned part of a frame where that is due. `root` is the expected position of the body, world frame.

@@ -201,9 +201,10 @@ impl LimbRaycaster {
         }
     }
 
-    /// Returns the depth at which the ray through `(x / z, y / z)` meets the limb, meters; NaN if it misses.
+    /// Returns the depth at which the ray to a point, camera frame, meets the limb, meters; NaN if it misses.
     #[inline(always)]
-    pub(crate) fn depth_at(&self, x: f64, y: f64) -> f64 {
+    pub(crate) fn depth_before(&self, point: Vec3) -> f64 {
+        let (x, y) = (point.x / point.z, point.y / point.z);
         // Most rays do not come near most limbs.
         if self.is_near(x, y) { self.depth_within(x, y) } else { f64::NAN }
     }
