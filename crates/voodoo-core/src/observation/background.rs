@@ -111,9 +111,8 @@ impl Backgrounds {
         let Some(image) = frame.images.get(own.image) else { return };
         let Some(depth) = self.depth_mut(image) else { return };
         for pixel in own.pixels {
-            let z = image.pixels.get(*pixel) * image.meters_per_unit as f32;
             if let Some(depth) = depth.get_mut(*pixel)
-                && (!(z > 0.0) || Background::contains(*depth, z))
+                && image.depth(*pixel).is_none_or(|z| Background::contains(*depth, z))
             {
                 *depth = 0.0;
             }

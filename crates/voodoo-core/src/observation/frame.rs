@@ -165,6 +165,13 @@ impl DepthImage<'_> {
         f64::from(z) * Vec3::new(x, y, 1.0)
     }
 
+    /// The measured depth of a pixel, meters; `None` without a return.
+    #[inline(always)]
+    pub(crate) fn depth(&self, index: usize) -> Option<f32> {
+        let z = self.pixels.get(index) * self.meters_per_unit as f32;
+        (z > 0.0 && z.is_finite()).then_some(z)
+    }
+
     /// Returns the measured depth at the pixel that a world point projects to (0 for no return) and the depth of the point
     /// itself, meters; `None` outside the image.
     pub fn measured(&self, place: Vec3) -> Option<[f64; 2]> {

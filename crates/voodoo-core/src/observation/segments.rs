@@ -108,9 +108,8 @@ impl Segments {
             let spread = (step * step) as f64 / (fx * fy * REFERENCE_PATCH);
             for row in (0..image.camera.height()).step_by(step) {
                 for pixel in (row * image.camera.width()..(row + 1) * image.camera.width()).step_by(step) {
-                    let z = image.pixels.get(pixel) * image.meters_per_unit as f32;
-                    let returned = z > 0.0 && z.is_finite();
-                    if !returned || background.get(pixel).is_some_and(|depth| Background::contains(*depth, z)) {
+                    let Some(z) = image.depth(pixel) else { continue };
+                    if background.get(pixel).is_some_and(|depth| Background::contains(*depth, z)) {
                         continue;
                     }
                     let point = image.world_from_sensor * image.back_project(pixel, z) - views.origin;

@@ -104,16 +104,6 @@ impl DetectionCheck {
         self.since.is_none_or(|since| stamp - since < NEW_TRACK_AGE)
     }
 
-    /// Whether a detection or a second of tracking confirmed the track.
-    pub(super) fn is_confirmed(&self, stamp: f64) -> bool {
-        self.is_detected() || !self.is_new(stamp)
-    }
-
-    /// Whether a detection confirmed the track.
-    pub(super) fn is_detected(&self) -> bool {
-        self.auto_initialized || self.confirmed
-    }
-
     /// Counts a frame and returns whether the detector is due for a person beside so many others.
     pub(super) fn is_due(&mut self, stamp: f64, reasons: Reasons, others: usize) -> bool {
         let Reasons { uncertain, anywhere, unlike } = reasons;

@@ -78,7 +78,7 @@ impl Relocalizer {
 
     /// Whether a detection or a second of tracking confirmed the track.
     pub(crate) fn is_confirmed(&self, stamp: f64) -> bool {
-        self.check.is_confirmed(stamp)
+        self.is_detected() || !self.is_new(stamp)
     }
 
     /// Notes that a detection elsewhere is somebody else.
@@ -88,7 +88,7 @@ impl Relocalizer {
 
     /// Whether a detection confirmed the track.
     pub(crate) fn is_detected(&self) -> bool {
-        self.check.is_detected()
+        self.check.auto_initialized || self.check.confirmed
     }
 
     /// Whether the track was started less than a second ago.
