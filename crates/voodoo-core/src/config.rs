@@ -79,14 +79,27 @@ pub struct Field {
 }
 
 /// A type that a configuration entry can have.
-trait Entry: Sized + Clone {
+trait Entry: Sized {
+    /// Description of the type, to which the range and the keywords are added.
+    const EXPECTED: &'static str;
     const WORDS: &'static [&'static str] = &[];
     fn value(&self) -> Value;
     fn parse(value: &RawValue) -> Option<Self>;
-    fn number(&self) -> Option<f64> {
-        None
-    }
-    fn expected(range: Option<(f64, f64)>) -> String;
+}
+
+/// A value from outside as an entry, checked for type and range.
+fn parsed<T: Entry>(key: &'static str, value: &RawValue, range: Option<(f64, f64)>) -> Result<T, ConfigError> {
+    let within = match (value, range) {
+        (RawValue::Number(number), Some((low, high))) => (low..=high).contains(number),
+        _ => true,
+    };
+    T::parse(value).filter(|_| within).ok_or_else(|| {
+        let expected = match range {
+            Some((low, high)) => format!("{} from {low} to {high}", T::EXPECTED),
+            None => format!("{}{}", T::EXPECTED, T::WORDS.join(", ")),
+        };
+        ConfigError::Value { key, expected, found: value.clone() }
+    })
 }
 
 /// A value from outside, not yet validated.
@@ -103,24 +116,20 @@ pub enum RawValue {
 }
 
 impl Entry for f64 {
+    const EXPECTED: &'static str = "a number";
     fn value(&self) -> Value {
         Value::Real(*self)
     }
     fn parse(value: &RawValue) -> Option<Self> {
         match value {
-            RawValue::Number(number) => Some(*number),
+            RawValue::Number(number) if number.is_finite() => Some(*number),
             _ => None,
         }
-    }
-    fn number(&self) -> Option<f64> {
-        Some(*self)
-    }
-    fn expected(range: Option<(f64, f64)>) -> String {
-        range.map_or("a number".into(), |(low, high)| format!("a number from {low} to {high}"))
     }
 }
 
 impl Entry for usize {
+    const EXPECTED: &'static str = "a whole number";
     fn value(&self) -> Value {
         Value::Whole(*self)
     }
@@ -132,15 +141,10 @@ impl Entry for usize {
             _ => None,
         }
     }
-    fn number(&self) -> Option<f64> {
-        Some(*self as f64)
-    }
-    fn expected(range: Option<(f64, f64)>) -> String {
-        range.map_or("a whole number".into(), |(low, high)| format!("a whole number from {low} to {high}"))
-    }
 }
 
 impl Entry for bool {
+    const EXPECTED: &'static str = "true or false";
     fn value(&self) -> Value {
         Value::Switch(*self)
     }
@@ -149,9 +153,6 @@ impl Entry for bool {
             RawValue::Switch(switch) => Some(*switch),
             _ => None,
         }
-    }
-    fn expected(_: Option<(f64, f64)>) -> String {
-        "true or false".into()
     }
 }
 
@@ -164,6 +165,7 @@ macro_rules! words {
         #[non_exhaustive]
         pub enum $name { $($(#[doc = $doc])* $variant),+ }
         impl Entry for $name {
+            const EXPECTED: &'static str = "one of ";
             const WORDS: &'static [&'static str] = &[$($word),+];
             fn value(&self) -> Value {
                 Value::Word(match self { $(Self::$variant => $word),+ })
@@ -173,9 +175,6 @@ macro_rules! words {
                     $(RawValue::Word(word) if word == $word => Some(Self::$variant),)+
                     _ => None,
                 }
-            }
-            fn expected(_: Option<(f64, f64)>) -> String {
-                format!("one of {}", Self::WORDS.join(", "))
             }
         }
     };
@@ -222,23 +221,11 @@ macro_rules! config {
             pub fn set(&mut self, key: &str, value: &RawValue) -> Result<(), ConfigError> {
                 match key {
                     $(stringify!($name) => {
-                        let range: Option<(f64, f64)> = config!(@range $($low $high)?);
-                        let parsed = <$kind as Entry>::parse(value).filter(|entry| {
-                            match (entry.number(), range) {
-                                (Some(number), Some((low, high))) => (low..=high).contains(&number),
-                                (Some(number), None) => number.is_finite(),
-                                _ => true,
-                            }
-                        });
-                        self.$name = parsed.ok_or_else(|| ConfigError::Value {
-                            key: stringify!($name),
-                            expected: <$kind as Entry>::expected(range),
-                            found: value.clone(),
-                        })?;
-                        Ok(())
+                        self.$name = parsed(stringify!($name), value, config!(@range $($low $high)?))?;
                     })+
-                    _ => Err(ConfigError::UnknownKey(key.to_owned())),
+                    _ => return Err(ConfigError::UnknownKey(key.to_owned())),
                 }
+                Ok(())
             }
         }
     };

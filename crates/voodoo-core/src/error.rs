@@ -1,5 +1,7 @@
 //! The errors of bodies and of tracking: each states what was expected and what was found.
 
+use std::fmt::Display;
+
 use crate::shape::ShapeError;
 
 /// A body description that cannot be tracked. `key` is the path of the offending entry.
@@ -64,6 +66,16 @@ impl BodyError {
     /// A value outside its domain: the key of the entry, the expected value and the value found.
     pub fn value(key: impl Into<String>, expected: &'static str, found: impl Into<String>) -> Self {
         Self::Value { key: key.into(), expected, found: found.into() }
+    }
+
+    /// Rejects a value that is not valid; the texts are made only then.
+    pub(crate) fn unless(
+        valid: bool,
+        key: impl Display,
+        expected: &'static str,
+        found: impl Display,
+    ) -> Result<(), Self> {
+        if valid { Ok(()) } else { Err(Self::value(key.to_string(), expected, found.to_string())) }
     }
 }
 
@@ -152,10 +164,10 @@ impl TrackError {
     /// Rejects a measurement that is not valid; the texts are made only then.
     pub(crate) fn unless(
         valid: bool,
-        what: impl FnOnce() -> String,
+        what: impl Display,
         expected: &'static str,
-        found: impl FnOnce() -> String,
+        found: impl Display,
     ) -> Result<(), Self> {
-        if valid { Ok(()) } else { Err(Self::measurement(what(), expected, found())) }
+        if valid { Ok(()) } else { Err(Self::measurement(what.to_string(), expected, found.to_string())) }
     }
 }

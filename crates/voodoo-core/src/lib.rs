@@ -199,7 +199,6 @@ pub use observation::picture::{ColorImage, ColorPixels};
 pub use people::one::Tracker;
 pub use people::{People, PeopleOptions, Refusal};
 pub use regions::RegionLine;
-pub use shape::ray::RayHit;
 pub use shape::{Region, ShapeError, SurfaceBatch, SurfacePoint, TaperedEllipticCylinder};
 pub use tracker::BodyTracker;
 pub use tracker::estimate::{Estimate, LimbStatus, SourceReport, Status};

@@ -10,6 +10,7 @@ use crate::fit::{Context, Setting};
 use crate::math::{Pose, Quat, Vec3};
 use crate::observation::background::Backgrounds;
 use crate::observation::candidates::body_box;
+use crate::observation::depth_view::DepthViews;
 use crate::observation::frame::{DepthImage, DepthPixels, Frame};
 use crate::observation::observer::Observer;
 use crate::observation::ownership::OwnershipMask;
@@ -166,6 +167,11 @@ pub(crate) fn without_background() -> Config {
 /// Greatest distance between the limbs of two poses, meters.
 pub(crate) fn farthest(first: &[Pose], second: &[Pose]) -> f64 {
     first.iter().zip(second).map(|(a, b)| a.translation.distance(b.translation)).fold(0.0, f64::max)
+}
+
+/// A frame without segmented images whose working frame is the world, for queries.
+pub(crate) fn views<'a>(frame: &'a Frame<'a>, backgrounds: &'a Backgrounds) -> DepthViews<'a> {
+    DepthViews { frame, backgrounds, segmented: &[false; 8], origin: Vec3::ZERO }
 }
 
 /// A camera that lives as long as the tests.

@@ -2,6 +2,7 @@
 
 use std::{mem, process};
 
+use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use crate::config::Config;
@@ -26,9 +27,17 @@ impl Threads {
         Ok(Self { count: config.threads, pool, process: process::id() })
     }
 
+    /// Does `work` on every item, with its index. Each is processed by one thread, so the result does not depend on their number.
+    pub(crate) fn each<T: Send>(&mut self, items: &mut [T], work: impl Fn((usize, &mut T)) + Send + Sync) {
+        match self.pool() {
+            Some(pool) => pool.install(|| items.par_iter_mut().enumerate().for_each(work)),
+            None => items.iter_mut().enumerate().for_each(work),
+        }
+    }
+
     /// The threads, `None` for a single one. A forked process has none of its parent's threads, and waiting for them would never
     /// end: it starts its own; if the system cannot, the calling thread does everything, with the same result.
-    pub(crate) fn pool(&mut self) -> Option<&ThreadPool> {
+    fn pool(&mut self) -> Option<&ThreadPool> {
         if self.process != process::id() {
             mem::forget(self.pool.take());
             self.pool = started(self.count).ok().flatten();

@@ -119,8 +119,8 @@ fn shapes(from: &mut Hostile) {
     if point.is_finite() && point.abs().max_element() < 1e9 {
         let closest = shape.closest_point(point);
         assert!(closest.point.is_finite() && closest.signed_distance.is_finite(), "{shape:?} {point:?} {closest:?}");
-        if let Some(hit) = shape.cast_ray(point, direction, from.positive(5.0)) {
-            assert!(hit.distance.is_finite(), "{shape:?} {point:?} {direction:?} {hit:?}");
+        if let Some(distance) = shape.cast_ray(point, direction) {
+            assert!(distance.is_finite(), "{shape:?} {point:?} {direction:?} {distance}");
         }
     }
 }

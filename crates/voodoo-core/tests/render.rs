@@ -59,7 +59,7 @@ fn agrees_with_exact_rays(body: &Body, poses: &[Pose], view: &Viewpoint) -> usiz
             let limb_from_world = poses[limb].inverse();
             let origin = limb_from_world * view.world_from_sensor.translation + Vec3::Z * 0.5 * fatter;
             let way = limb_from_world.rotation * (view.world_from_sensor.rotation * direction);
-            shape.cast_ray(origin, way, f64::INFINITY).map(|hit| hit.distance / way.length())
+            shape.cast_ray(origin, way).map(|distance| distance / way.length())
         };
         let nearest = |fatter: f64| (0..poses.len()).filter_map(|limb| hit(limb, fatter)).fold(f64::INFINITY, f64::min);
         let exact = nearest(0.0);

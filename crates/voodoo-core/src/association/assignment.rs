@@ -156,6 +156,7 @@ mod tests {
     use crate::observation::background::Backgrounds;
     use crate::observation::candidates::body_box;
     use crate::observation::frame::{Cloud, Frame, PointSlice, Scope};
+    use crate::testing::views;
 
     const MARGIN: f64 = 0.1;
 
@@ -178,7 +179,7 @@ mod tests {
         let mut candidates = Candidates::default();
         let bounds = body_box(&body, &poses, 0.3);
         let frame = Frame { clouds: &clouds, ..Frame::empty(0.0) };
-        candidates.gather(&frame, Vec3::ZERO, &bounds, &Backgrounds::default(), &Config::default());
+        candidates.gather(views(&frame, &Backgrounds::default()), &bounds, &Config::default());
         assert!(candidates.len() > 1500);
         (body, poses, candidates)
     }

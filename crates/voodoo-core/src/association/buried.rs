@@ -25,8 +25,7 @@ impl Buried {
         let Self { limbs, spheres } = self;
         let parts = body.limbs();
         refill(spheres, parts.iter().zip(poses).map(|(limb, pose)| limb.shape.sphere(pose)));
-        limbs.clear();
-        limbs.extend((0..poses.len()).map(|limb| {
+        let is_buried = |limb: usize| {
             let inside = |fraction: &&f64| {
                 let place = poses[limb] * (**fraction * parts[limb].shape.length() * Vec3::Z);
                 (0..poses.len()).any(|other| {
@@ -37,7 +36,8 @@ impl Buried {
                 })
             };
             2 * ALONG_LIMB.iter().filter(inside).count() > ALONG_LIMB.len()
-        }));
+        };
+        refill(limbs, (0..poses.len()).map(is_buried));
         limbs
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::association::correspondence::ContourPair;
 use crate::body::{Body, Limb};
-use crate::math::{Points, Pose, Vec3, reset, smooth_step, vectorized};
+use crate::math::{Points, Pose, Vec3, refill, reset, smooth_step, vectorized};
 use crate::observation::depth_view::{DepthView, Pixel};
 
 /// Where along a limb its contour is searched for, as fractions of its length; the ends also belong to the neighbors.
@@ -81,15 +81,8 @@ pub(crate) fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut
         }
         let thickness = section.extent(facing.ahead);
         for side in [facing.side, -facing.side] {
-            search(
-                section.center(),
-                side,
-                section.extent(side),
-                thickness,
-                section.farthest_point(side),
-                EDGE_REACH,
-                sine,
-            );
+            let (rim, foot) = (section.extent(side), section.farthest_point(side));
+            search(section.center(), side, rim, thickness, foot, EDGE_REACH, sine);
         }
     }
     let tip = Vec3::new(0.0, 0.0, shape.length());
@@ -246,11 +239,11 @@ impl Contours {
 
     /// The rim points at `poses` and the edges that were found, as pairs.
     pub(crate) fn pairs(&self, poses: &[Pose], pairs: &mut Vec<ContourPair>) {
-        pairs.clear();
-        pairs.extend(self.edges.iter().map(|LimbEdge { limb, edge, target, .. }| {
+        let pair = |LimbEdge { limb, edge, target, .. }: &LimbEdge| {
             let (x, normal) = (poses[*limb] * edge.foot, poses[*limb].rotation * edge.side);
             ContourPair { limb: *limb, x, normal, distance: normal.dot(*target - x), weight: edge.weight }
-        }));
+        };
+        refill(pairs, self.edges.iter().map(pair));
     }
 }
 
@@ -274,8 +267,8 @@ mod tests {
         let limb_from_camera = pose.inverse();
         let depth = |index: usize| {
             let ray = camera.back_project(index, 1.0);
-            let hit = shape.cast_ray(limb_from_camera.translation, limb_from_camera.rotation * ray, f64::INFINITY);
-            hit.map_or(0.0, |hit| (hit.distance / ray.length()) as f32)
+            let hit = shape.cast_ray(limb_from_camera.translation, limb_from_camera.rotation * ray);
+            hit.map_or(0.0, |distance| (distance / ray.length()) as f32)
         };
         (0..WIDTH * WIDTH).map(depth).collect()
     }

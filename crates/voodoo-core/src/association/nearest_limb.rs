@@ -37,15 +37,10 @@ impl NearestLimb {
     /// Sets the limb poses, with the boxes enlarged by `margin`. `buried` limbs contain no point; an empty slice means that none
     /// is buried.
     pub(crate) fn place(&mut self, body: &Body, poses: &[Pose], margin: f64, buried: &[bool]) {
-        self.limbs.clear();
-        self.limbs.extend(body.limbs().iter().zip(poses).enumerate().map(|(index, (limb, pose))| {
-            let open = LimbBox::new(limb, pose, margin);
-            if buried.get(index) == Some(&true) {
-                LimbBox { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3], ..open }
-            } else {
-                open
-            }
-        }));
+        refill(&mut self.limbs, body.limbs().iter().zip(poses).map(|(limb, pose)| LimbBox::new(limb, pose, margin)));
+        for (limb, _) in self.limbs.iter_mut().zip(buried).filter(|(_, buried)| **buried) {
+            (limb.low, limb.high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        }
         refill(&mut self.groups, self.limbs.chunks(LANES).map(Group::new));
     }
 
@@ -234,14 +229,14 @@ impl LimbBox {
         let to_f32 = |v: Vec3| v.to_array().map(|value| value as f32);
         let limb_from_working = working_from_limb.inverse();
         let shape = &limb.shape;
-        let bounds = shape.local_aabb();
+        let bounds = shape.local_aabb().enlarged(margin);
         let ends = [(shape.a0(), shape.b0()), (shape.a1(), shape.b1())];
         let ratio = |(a, b): (f64, f64)| a.min(b) / a.max(b).max(f64::MIN_POSITIVE);
         Self {
             axes: [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| to_f32(limb_from_working.rotation * axis)),
             shift: to_f32(limb_from_working.translation),
-            low: to_f32(bounds.mins - Vec3::splat(margin)),
-            high: to_f32(bounds.maxs + Vec3::splat(margin)),
+            low: to_f32(bounds.mins),
+            high: to_f32(bounds.maxs),
             length: shape.length() as f32,
             a: [shape.a0() as f32, ((shape.a1() - shape.a0()) / shape.length()) as f32],
             b: [shape.b0() as f32, ((shape.b1() - shape.b0()) / shape.length()) as f32],

@@ -11,9 +11,7 @@ pub(crate) type Pair = Vec<usize>;
 impl Body {
     /// The body with all lengths multiplied by `factor`.
     pub fn scaled(&self, factor: f64) -> Result<Self, BodyError> {
-        if !factor.is_finite() || factor <= 0.0 {
-            return Err(BodyError::value("factor", "a finite factor above zero", factor.to_string()));
-        }
+        BodyError::unless(factor.is_finite() && factor > 0.0, "factor", "a finite factor above zero", factor)?;
         let scale_pose = |pose: &Pose| Pose::from_parts(pose.translation * factor, pose.rotation);
         let mut body = self.clone();
         for limb in &mut body.limbs {
@@ -49,19 +47,12 @@ impl Body {
     /// b0, a1, b1) by `axes`. The limb frame moves with the surface; joints and sites stay at their world positions. Does nothing
     /// if the result would not be a valid solid.
     pub(crate) fn change_girth(&mut self, limb: usize, shift: Vec3, axes: [f64; 4]) -> bool {
-        let shape = self.limbs[limb].shape;
-        let Ok(shape) = shape.stretched(1.0, axes) else { return false };
-        self.limbs[limb].shape = shape;
-        self.map_landmarks(limb, |position| position - shift);
-        true
+        self.reshape(limb, 1.0, axes, |position| position - shift)
     }
 
     /// Lengthens the surface of a limb by a factor; joints and sites stay. Does nothing if the result would not be a valid solid.
     pub(crate) fn change_tip(&mut self, limb: usize, factor: f64) {
-        let shape = self.limbs[limb].shape;
-        if let Ok(shape) = shape.stretched(factor, [1.0; 4]) {
-            self.limbs[limb].shape = shape;
-        }
+        self.reshape(limb, factor, [1.0; 4], |position| position);
     }
 
     /// Limbs that have children, grouped into left-right pairs of equal length.
@@ -79,10 +70,15 @@ impl Body {
 
     /// Lengthens a limb by a factor, with everything fixed to it. Does nothing if the result would not be a valid solid.
     pub(crate) fn change_length(&mut self, limb: usize, factor: f64) -> bool {
-        let shape = self.limbs[limb].shape;
-        let Ok(shape) = shape.stretched(factor, [1.0; 4]) else { return false };
+        self.reshape(limb, factor, [1.0; 4], |position| position * Vec3::new(1.0, 1.0, factor))
+    }
+
+    /// Multiplies the length and the semi-axes (a0, b0, a1, b1) of a limb by factors, and replaces the positions of everything fixed
+    /// to it. Does nothing and returns false if the result would not be a valid solid.
+    pub(super) fn reshape(&mut self, limb: usize, length: f64, axes: [f64; 4], map: impl Fn(Vec3) -> Vec3) -> bool {
+        let Ok(shape) = self.limbs[limb].shape.stretched(length, axes) else { return false };
         self.limbs[limb].shape = shape;
-        self.map_landmarks(limb, |position| position * Vec3::new(1.0, 1.0, factor));
+        self.map_landmarks(limb, map);
         true
     }
 
@@ -106,28 +102,17 @@ impl Body {
     /// The body without a limb, its sites and its descendants, and the indices of the remaining limbs.
     pub fn without_limb(&self, name: &str) -> Result<(Self, Vec<usize>), BodyError> {
         let removed = self.limb_index(name)?;
-        if removed == 0 {
-            return Err(BodyError::value("limb", "a limb other than the root", name));
-        }
-        let mut new_index: Vec<Option<usize>> = Vec::with_capacity(self.limbs.len());
-        let mut kept = Vec::new();
-        for (index, limb) in self.limbs.iter().enumerate() {
-            let stays = index != removed && limb.parent.as_ref().is_none_or(|(parent, _)| new_index[*parent].is_some());
-            new_index.push(stays.then_some(kept.len()));
-            if stays {
-                kept.push(index);
-            }
-        }
-        let limbs = kept
-            .iter()
-            .map(|index| {
-                let mut limb = self.limbs[*index].clone();
-                limb.parent = limb.parent.and_then(|(parent, joint)| Some((new_index[parent]?, joint)));
-                limb
-            })
-            .collect();
-        let sites =
-            self.sites.iter().filter_map(|site| Some(Site { limb: new_index[site.limb]?, ..site.clone() })).collect();
+        BodyError::unless(removed > 0, "limb", "a limb other than the root", name)?;
+        let stays =
+            |limb: &usize| !std::iter::successors(Some(*limb), |limb| self.parent(*limb)).any(|up| up == removed);
+        let kept: Vec<usize> = (0..self.limbs.len()).filter(stays).collect();
+        let new_index = |limb: usize| kept.binary_search(&limb).ok();
+        let limb = |index: &usize| {
+            let limb = self.limbs[*index].clone();
+            Limb { parent: limb.parent.and_then(|(parent, joint)| Some((new_index(parent)?, joint))), ..limb }
+        };
+        let site = |site: &Site| Some(Site { limb: new_index(site.limb)?, ..site.clone() });
+        let (limbs, sites) = (kept.iter().map(limb).collect(), self.sites.iter().filter_map(site).collect());
         Ok((Self::new(self.name.clone(), limbs, sites)?, kept))
     }
 

@@ -4,7 +4,7 @@
 
 use super::{Body, LimbRole};
 use crate::error::BodyError;
-use crate::math::{Pose, Vec3};
+use crate::math::{Aabb, Pose, Vec3};
 
 /// Stature from which on proportions are those of an adult, meters.
 const GROWN: f64 = 1.55;
@@ -37,10 +37,7 @@ impl Body {
                 LimbRole::UpperArm(_) | LimbRole::Forearm(_) | LimbRole::Hand(_) => (arm, girth),
                 LimbRole::Thigh(_) | LimbRole::Calf(_) | LimbRole::Foot(_) => (leg, girth),
             };
-            if let Ok(shape) = body.limbs[limb].shape.stretched(size, [size * girth; 4]) {
-                body.limbs[limb].shape = shape;
-                body.map_landmarks(limb, |position| position * size);
-            }
+            body.reshape(limb, size, [size * girth; 4], |position| position * size);
         }
         body
     }
@@ -48,13 +45,9 @@ impl Body {
     /// Height of the highest above the lowest point of the skeleton at rest, meters.
     fn upright(&self) -> f64 {
         let rest = self.rest_pose(Pose::IDENTITY);
-        let ends = self
-            .limbs
-            .iter()
-            .zip(&rest)
-            .flat_map(|(limb, pose)| [0.0, limb.shape.length()].map(|along| (*pose * (Vec3::Z * along)).z));
-        let (low, high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
-        (high - low).max(0.0)
+        let limbs = self.limbs.iter().zip(&rest);
+        let ends = limbs.flat_map(|(limb, pose)| [0.0, limb.shape.length()].map(|along| *pose * (Vec3::Z * along)));
+        Aabb::from_points(ends).extents().z.max(0.0)
     }
 
     /// An adult of stature 1 as a person of this stature.

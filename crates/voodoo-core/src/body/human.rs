@@ -324,9 +324,7 @@ impl Body {
     /// Limb frames have z from the proximal to the distal end, x forward (feet: up) in the standing pose. Hinges rotate about the
     /// joint frame's x axis; a positive angle is flexion.
     pub fn human(stature: f64, model: HumanModel) -> Result<Self, BodyError> {
-        if !(0.3..=3.0).contains(&stature) {
-            return Err(BodyError::value("stature", "meters from 0.3 to 3.0", stature.to_string()));
-        }
+        BodyError::unless((0.3..=3.0).contains(&stature), "stature", "meters from 0.3 to 3.0", stature)?;
         let papers = model == HumanModel::Papers;
         let build = if model == HumanModel::Measured { &MEASURED } else { &ANSUR };
         let (limbs, poses, sites) = Default::default();

@@ -21,6 +21,7 @@ pub use roles::{LimbRole, Roles, Side};
 use crate::error::BodyError;
 use crate::math::{Pose, Vec3, is_place, is_rigid};
 use crate::shape::TaperedEllipticCylinder;
+use std::fmt::{Arguments, Display};
 use std::sync::Arc;
 
 /// One rigid part of a body. Its frame has z along the axis of the shape, from the proximal end to the distal one.
@@ -150,6 +151,13 @@ impl Body {
         limbs.filter_map(|(limb, part)| part.parent.as_ref().map(|(parent, joint)| (limb, *parent, joint)))
     }
 
+    /// Pairs of a clavicle and the upper arm that it carries. Other limbs that a user attached to a clavicle are not arms.
+    pub(crate) fn clavicles(&self) -> impl Iterator<Item = [usize; 2]> {
+        let is_arm = |limb| matches!(self.roles.joint(limb), Some(JointRole::Shoulder(_)));
+        let arms = self.joints().filter(move |(limb, parent, _)| is_arm(*limb) && self.roles.is_clavicle(*parent));
+        arms.map(|(limb, parent, _)| [parent, limb])
+    }
+
     /// The children of a limb.
     pub fn children(&self, limb: usize) -> impl Iterator<Item = usize> + '_ {
         (0..self.limbs.len()).filter(move |other| self.parent(*other) == Some(limb))
@@ -183,101 +191,81 @@ impl Body {
     /// The limb whose surface is nearest to a point (approximately, see [`TaperedEllipticCylinder::approximate_distance`]); the
     /// first of equals.
     pub(crate) fn closest_limb(&self, world_from_limb: &[Pose], point: Vec3) -> usize {
-        let (mut closest, mut least) = (0, f64::INFINITY);
-        for (index, (limb, pose)) in self.limbs.iter().zip(world_from_limb).enumerate() {
-            let distance = limb.shape.approximate_distance(pose.inverse_transform_point(point));
-            if distance < least {
-                (closest, least) = (index, distance);
-            }
-        }
-        closest
+        let limbs = self.limbs.iter().zip(world_from_limb);
+        let distances = limbs.map(|(limb, pose)| limb.shape.approximate_distance(pose.inverse_transform_point(point)));
+        distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(closest, _)| closest)
     }
 
     fn check(&self) -> Result<(), BodyError> {
-        let wrong = |key: &str, expected, found: &str| Err(BodyError::value(key, expected, found));
         if self.limbs.is_empty() {
             return Err(BodyError::Empty);
         }
-        if self.limbs.len() > MOST_LIMBS || self.sites.len() > MOST_SITES {
-            let found = format!("{} and {}", self.limbs.len(), self.sites.len());
-            return wrong("body", "at most 1,000 limbs and 10,000 sites", &found);
-        }
+        let (limbs, sites) = (self.limbs.len(), self.sites.len());
+        let (fits, found) = (limbs <= MOST_LIMBS && sites <= MOST_SITES, format_args!("{limbs} and {sites}"));
+        BodyError::unless(fits, "body", "at most 1,000 limbs and 10,000 sites", found)?;
         check_letters("name", &self.name)?;
         for (index, limb) in self.limbs.iter().enumerate() {
-            let key = format!("limbs.{}", limb.name);
-            check_name(&key, &limb.name, self.limbs[..index].iter().map(|other| &other.name))?;
-            match (&limb.parent, index) {
-                (None, 0) => {}
-                (Some((parent, joint)), 1..) if *parent < index => {
-                    check_letters(&format!("{key}.joint.name"), &joint.name)?;
-                    check_joint(&format!("{key}.joint"), joint)?;
-                }
-                (None, _) => {
-                    return wrong(&format!("{key}.parent"), "a parent (only the first limb is the root)", "none");
-                }
-                (Some((parent, _)), _) => {
-                    let found = format!("limb {parent}");
-                    return wrong(&format!("{key}.parent"), "a limb that stands before this one", &found);
-                }
-            }
+            let key = format_args!("limbs.{}", limb.name);
+            check_name(key, &limb.name, self.limbs[..index].iter().map(|other| &other.name))?;
+            let parent_key = format_args!("{key}.parent");
+            let Some((parent, joint)) = &limb.parent else {
+                BodyError::unless(index == 0, parent_key, "a parent (only the first limb is the root)", "none")?;
+                continue;
+            };
+            let (expected, found) = ("a limb that stands before this one", format_args!("limb {parent}"));
+            BodyError::unless(*parent < index, parent_key, expected, found)?;
+            check_letters(format_args!("{key}.joint.name"), &joint.name)?;
+            check_joint(format_args!("{key}.joint"), joint)?;
         }
         for (index, site) in self.sites.iter().enumerate() {
-            let key = format!("sites.{}", site.name);
-            check_name(&key, &site.name, self.sites[..index].iter().map(|other| &other.name))?;
-            if site.limb >= self.limbs.len() {
-                return wrong(&format!("{key}.limb"), "the index of a limb", &site.limb.to_string());
-            }
-            if !is_place(site.position) {
-                let found = format!("{:?}", site.position.to_array());
-                return wrong(&format!("{key}.position"), "finite meters, 1e9 at most", &found);
-            }
+            let key = format_args!("sites.{}", site.name);
+            check_name(key, &site.name, self.sites[..index].iter().map(|other| &other.name))?;
+            BodyError::unless(site.limb < limbs, format_args!("{key}.limb"), "the index of a limb", site.limb)?;
+            let (key, found) = (format_args!("{key}.position"), site.position.to_array());
+            BodyError::unless(is_place(site.position), key, "finite meters, 1e9 at most", format_args!("{found:?}"))?;
         }
         Ok(())
     }
 }
 
-fn check_name<'a>(key: &str, name: &str, mut before: impl Iterator<Item = &'a String>) -> Result<(), BodyError> {
-    if name.is_empty() {
-        return Err(BodyError::value(key, "a name", "an empty one"));
-    }
-    check_letters(key, name)?;
+fn check_name<'a>(
+    key: impl Display,
+    name: &str,
+    mut before: impl Iterator<Item = &'a String>,
+) -> Result<(), BodyError> {
+    BodyError::unless(!name.is_empty(), &key, "a name", "an empty one")?;
+    check_letters(&key, name)?;
     if before.any(|known| known == name) {
-        return Err(BodyError::Duplicate { key: key.into(), name: name.into() });
+        return Err(BodyError::Duplicate { key: key.to_string(), name: name.into() });
     }
     Ok(())
 }
 
 /// Rejects characters that break file formats: tabs and line breaks separate table cells, braces delimit trees of bones.
-fn check_letters(key: &str, name: &str) -> Result<(), BodyError> {
-    if name.chars().any(|letter| letter.is_control() || matches!(letter, '{' | '}' | '\u{2028}' | '\u{2029}')) {
-        let expected = "a name without tabs, line breaks and braces";
-        return Err(BodyError::value(key, expected, format!("{name:?}")));
-    }
-    Ok(())
+fn check_letters(key: impl Display, name: &str) -> Result<(), BodyError> {
+    let breaks = |letter: char| letter.is_control() || matches!(letter, '{' | '}' | '\u{2028}' | '\u{2029}');
+    let (expected, found) = ("a name without tabs, line breaks and braces", format_args!("{name:?}"));
+    BodyError::unless(!name.contains(breaks), key, expected, found)
 }
 
-fn check_joint(key: &str, joint: &Joint) -> Result<(), BodyError> {
-    let wrong = |field: &str, expected, found: String| Err(BodyError::value(format!("{key}.{field}"), expected, found));
-    if joint.semi_axes.iter().any(|axis| !axis.is_finite() || *axis < 0.0) {
-        return wrong("semi_axes", "two finite lengths, zero or more", format!("{:?}", joint.semi_axes));
-    }
-    if !joint.weight.is_finite() || joint.weight <= 0.0 {
-        return wrong("weight", "a finite weight above zero", joint.weight.to_string());
-    }
-    if !joint.motion.is_finite() || joint.motion <= 0.0 {
-        return wrong("motion", "a finite angle above zero", joint.motion.to_string());
-    }
-    if let Some(limits) = joint
-        .limits
-        .filter(|limits| !limits.iter().all(|[low, high]| low <= high && low.is_finite() && high.is_finite()))
-    {
-        return wrong("limits", "three pairs (least, greatest) of radians", format!("{limits:?}"));
+fn check_joint(key: impl Display, joint: &Joint) -> Result<(), BodyError> {
+    let check = |valid: bool, field: &str, expected, found: Arguments| {
+        BodyError::unless(valid, format_args!("{key}.{field}"), expected, found)
+    };
+    let Joint { semi_axes, weight, motion, limits, .. } = joint;
+    let valid = semi_axes.iter().all(|axis| axis.is_finite() && *axis >= 0.0);
+    check(valid, "semi_axes", "two finite lengths, zero or more", format_args!("{semi_axes:?}"))?;
+    let valid = weight.is_finite() && *weight > 0.0;
+    check(valid, "weight", "a finite weight above zero", format_args!("{weight}"))?;
+    let valid = motion.is_finite() && *motion > 0.0;
+    check(valid, "motion", "a finite angle above zero", format_args!("{motion}"))?;
+    if let Some(limits) = limits {
+        let valid = limits.iter().all(|[low, high]| low <= high && low.is_finite() && high.is_finite());
+        check(valid, "limits", "three pairs (least, greatest) of radians", format_args!("{limits:?}"))?;
     }
     for (field, pose) in [("parent_from_joint", &joint.parent_from_joint), ("limb_from_joint", &joint.limb_from_joint)]
     {
-        if !is_rigid(pose) {
-            return wrong(field, "a finite position and a unit quaternion", format!("{pose:?}"));
-        }
+        check(is_rigid(pose), field, "a finite position and a unit quaternion", format_args!("{pose:?}"))?;
     }
     Ok(())
 }

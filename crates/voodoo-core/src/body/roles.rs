@@ -145,10 +145,6 @@ pub struct Roles {
     joints: Vec<Option<JointRole>>,
     joint_sites: Vec<Option<usize>>,
     groups: Vec<u16>,
-    /// For each site: its role.
-    sites: Vec<Option<JointRole>>,
-    /// Pairs of a clavicle and the upper arm that it carries.
-    clavicles: Vec<[usize; 2]>,
 }
 
 impl Roles {
@@ -160,23 +156,13 @@ impl Roles {
     pub(super) fn resolve<'a>(limbs: &'a [Limb], sites: &[Site]) -> Result<Self, BodyError> {
         let joint_name = |limb: &'a Limb| limb.parent.as_ref().map(|(_, joint)| joint.name.as_str());
         let site = |name: &str| sites.iter().position(|site| site.name == name);
-        let mut roles = Self {
+        let roles = Self {
             limbs: limbs.iter().map(|limb| LimbRole::from_name(&limb.name)).collect(),
             joints: limbs.iter().map(|limb| joint_name(limb).and_then(JointRole::from_name)).collect(),
             joint_sites: limbs.iter().map(|limb| joint_name(limb).and_then(site)).collect(),
             groups: groups(limbs),
-            sites: sites.iter().map(|site| JointRole::from_name(&site.name)).collect(),
-            clavicles: Vec::new(),
         };
         roles.check(limbs, sites)?;
-        for (limb, description) in limbs.iter().enumerate() {
-            // Other limbs that a user attached to a clavicle are not arms.
-            if let (Some((parent, _)), Some(JointRole::Shoulder(_))) = (&description.parent, roles.joint(limb))
-                && roles.is_clavicle(*parent)
-            {
-                roles.clavicles.push([*parent, limb]);
-            }
-        }
         Ok(roles)
     }
 
@@ -200,13 +186,10 @@ impl Roles {
                 return wrong(expected, format!("{} on {}", joint.name, limbs[*hangs_on].name));
             }
         }
-        for (site, role) in sites.iter().zip(&self.sites) {
-            if role.is_some() && opposite(site.limb, &site.name) {
-                return Err(BodyError::value(
-                    format!("sites.{}.limb", site.name),
-                    "a limb of the site's own side",
-                    limbs[site.limb].name.clone(),
-                ));
+        for site in sites {
+            if JointRole::from_name(&site.name).is_some() && opposite(site.limb, &site.name) {
+                let (key, found) = (format!("sites.{}.limb", site.name), &limbs[site.limb].name);
+                return Err(BodyError::value(key, "a limb of the site's own side", found));
             }
         }
         Ok(())
@@ -227,12 +210,6 @@ impl Roles {
         self.joints.iter().position(|role| *role == Some(joint))
     }
 
-    /// The site at a joint's center.
-    #[cfg(test)]
-    pub(crate) fn site_at(&self, joint: JointRole) -> Option<usize> {
-        self.sites.iter().position(|role| *role == Some(joint))
-    }
-
     /// The site at the center of the joint between a limb and its parent, found by the joint's name, whatever its role.
     pub(crate) fn joint_site(&self, limb: usize) -> Option<usize> {
         self.joint_sites.get(limb).copied().flatten()
@@ -241,11 +218,6 @@ impl Roles {
     /// Whether the joint of a limb to its parent is a sternoclavicular joint.
     pub(crate) fn is_clavicle(&self, limb: usize) -> bool {
         matches!(self.joint(limb), Some(JointRole::Sternoclavicular(_)))
-    }
-
-    /// Pairs of a clavicle and the upper arm on it.
-    pub(crate) fn clavicles(&self) -> &[[usize; 2]] {
-        &self.clavicles
     }
 
     /// The limb of the same name on the other side.
@@ -319,6 +291,10 @@ mod tests {
         Body::new("thing", names.iter().enumerate().map(limb).collect(), sites)
     }
 
+    fn site_at(body: &Body, joint: JointRole) -> Option<usize> {
+        body.sites().iter().position(|site| JointRole::from_name(&site.name) == Some(joint))
+    }
+
     #[test]
     fn every_limb_and_joint_of_the_human_has_a_role() {
         for (model, carrier) in [(HumanModel::Full, "l_clavicle"), (HumanModel::Papers, "torso")] {
@@ -338,11 +314,12 @@ mod tests {
                 for joint in [JointRole::Shoulder, JointRole::Elbow, JointRole::Hip, JointRole::Knee].map(|of| of(side))
                 {
                     let limb = roles.limb_at(joint).unwrap();
-                    assert_eq!(roles.joint_site(limb), roles.site_at(joint));
-                    assert_eq!(body.sites()[roles.site_at(joint).unwrap()].limb, limb);
+                    assert_eq!(roles.joint_site(limb), site_at(&body, joint));
+                    assert_eq!(body.sites()[site_at(&body, joint).unwrap()].limb, limb);
                 }
                 assert!(
-                    roles.site_at(JointRole::Wrist(side)).is_some() && roles.site_at(JointRole::Ankle(side)).is_some()
+                    site_at(&body, JointRole::Wrist(side)).is_some()
+                        && site_at(&body, JointRole::Ankle(side)).is_some()
                 );
             }
         }
@@ -351,9 +328,9 @@ mod tests {
     #[test]
     fn the_full_human_raises_two_clavicles_and_that_of_the_papers_none() {
         let body = human(HumanModel::Full);
-        let named = body.roles().clavicles().iter().map(|pair| pair.map(|limb| body.limbs()[limb].name.as_str()));
+        let named = body.clavicles().map(|pair| pair.map(|limb| body.limbs()[limb].name.as_str()));
         assert_eq!(named.collect::<Vec<_>>(), [["l_clavicle", "l_upperarm"], ["r_clavicle", "r_upperarm"]]);
-        assert!(human(HumanModel::Papers).roles().clavicles().is_empty());
+        assert!(human(HumanModel::Papers).clavicles().next().is_none());
     }
 
     #[test]
@@ -371,7 +348,7 @@ mod tests {
     fn a_lamp_has_no_roles_but_its_joints_have_sites() {
         let lamp = chain(&[["foot", ""], ["lower_arm", "ankle"], ["upper_arm", "elbow"], ["shade", "ball"]]).unwrap();
         let roles = lamp.roles();
-        assert!(roles.clavicles().is_empty());
+        assert!(lamp.clavicles().next().is_none());
         assert!((0..4).all(|limb| roles.limb(limb).is_none() && roles.joint(limb).is_none()));
         assert_eq!([0, 1, 2, 3].map(|limb| roles.joint_site(limb)), [None, Some(0), Some(1), Some(2)]);
         assert_eq!(roles.groups(), [0, 1, 2, 3]);
@@ -382,11 +359,11 @@ mod tests {
         let (body, _) = human(HumanModel::Full).without_limb("r_upperarm").unwrap();
         let roles = body.roles();
         assert_eq!(roles.limb_at(JointRole::Elbow(Side::Right)), None);
-        assert_eq!(roles.site_at(JointRole::Wrist(Side::Right)), None);
-        assert_eq!(roles.clavicles().len(), 1);
+        assert_eq!(site_at(&body, JointRole::Wrist(Side::Right)), None);
+        assert_eq!(body.clavicles().count(), 1);
         let hand = roles.limb_at(JointRole::Wrist(Side::Left)).unwrap();
         assert_eq!(body.limbs()[hand].name, "l_hand");
-        let leg = roles.site_at(JointRole::Knee(Side::Right)).unwrap();
+        let leg = site_at(&body, JointRole::Knee(Side::Right)).unwrap();
         assert_eq!(body.sites()[leg].name, "r_knee");
     }
 

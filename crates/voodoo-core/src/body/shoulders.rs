@@ -15,14 +15,14 @@ const RHYTHM: f64 = 0.3;
 pub(crate) fn raise_shoulders(body: &Body, previous: &[Pose], current: &[Pose], predicted: &mut [Pose]) {
     let limbs = body.limbs();
     let mut raised = false;
-    for [clavicle, arm] in body.roles().clavicles() {
-        let (Some((_, shoulder)), Some((trunk, joint))) = (&limbs[*arm].parent, &limbs[*clavicle].parent) else {
+    for [clavicle, arm] in body.clavicles() {
+        let (Some((_, shoulder)), Some((trunk, joint))) = (&limbs[arm].parent, &limbs[clavicle].parent) else {
             continue;
         };
         let rest = joint.parent_from_limb_at_rest();
         let hanging = rest.rotation * (shoulder.parent_from_limb_at_rest().rotation * Vec3::Z);
         let usual = |poses: &[Pose]| {
-            let along = poses[*trunk].rotation.inverse() * (poses[*arm].rotation * Vec3::Z);
+            let along = poses[*trunk].rotation.inverse() * (poses[arm].rotation * Vec3::Z);
             RHYTHM * (-hanging.dot(along)).clamp(0.0, 1.0).asin()
         };
         let more = usual(current) - usual(previous);
@@ -33,7 +33,7 @@ pub(crate) fn raise_shoulders(body: &Body, previous: &[Pose], current: &[Pose], 
         let lever = rest * shoulder.parent_from_joint.translation - joint.parent_from_joint.translation;
         let up = if axis.cross(lever).dot(hanging) > 0.0 { -axis } else { axis };
         let turn = Quat::from_axis_angle(predicted[*trunk].rotation * up, more);
-        let pose = &mut predicted[*clavicle];
+        let pose = &mut predicted[clavicle];
         pose.rotation = (turn * pose.rotation).normalize();
         raised = true;
     }

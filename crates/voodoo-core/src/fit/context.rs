@@ -60,10 +60,7 @@ pub(crate) struct Setting<'a> {
 
 impl<'a> Setting<'a> {
     /// Returns the context with this model.
-    pub(crate) fn with_model<'b>(self, model: &'b Model) -> Context<'b>
-    where
-        'a: 'b,
-    {
+    pub(crate) fn with_model(self, model: &'a Model) -> Context<'a> {
         let Self { config, observation, previous, time_scale } = self;
         Context { config, model, observation, previous, time_scale }
     }

@@ -52,14 +52,9 @@ impl Fit {
     /// Measures what every limb of the arms and legs explains where colors compare poses.
     pub(super) fn measure_pixel_gains(&mut self, context: Context, poses: &[Pose]) {
         if context.compares_colors() {
-            let Self { regions, correspondences, .. } = self;
-            let chains = &context.model.extremities;
-            regions.pixel_gains(
-                context.observation.frame(),
-                posed(context, poses),
-                chains,
-                &mut correspondences.region_support,
-            );
+            let (frame, chains) = (context.observation.frame(), &context.model.extremities);
+            let supports = &mut self.correspondences.region_support;
+            self.regions.pixel_gains(frame, posed(context, poses), chains, supports);
         }
     }
 }

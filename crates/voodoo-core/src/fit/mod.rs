@@ -8,8 +8,6 @@ mod motion;
 pub(crate) use context::{Context, Matched, Setting};
 pub(crate) use motion::{Motion, UNKNOWN_MOTION};
 
-use rayon::prelude::*;
-
 use crate::association::assignment::{Assignment, match_limb};
 use crate::association::buried::Buried;
 use crate::association::contour::Contours;
@@ -291,11 +289,7 @@ impl Fit {
                 match_visible_side(&limbs[index].shape, &poses[index], candidates, gate.distance, matches);
             }
         };
-        match threads.pool() {
-            // Each limb is processed by one thread in a fixed order, so the result does not depend on the number of threads.
-            Some(pool) => pool.install(|| correspondences.limbs.par_iter_mut().enumerate().for_each(work)),
-            None => correspondences.limbs.iter_mut().enumerate().for_each(work),
-        }
+        threads.each(&mut correspondences.limbs, work);
     }
 
     /// Steps 6 and 7: fits the body to the correspondences.

@@ -73,10 +73,7 @@ impl Motion {
     pub(crate) fn advance(&mut self, body: &Body, stamp: f64, damping: f64, start: bool) -> f64 {
         self.follow();
         let step = self.stamp.map(|last| stamp - last);
-        let ratio = match (step, self.interval) {
-            (Some(step), Some(interval)) => (step / interval).min(LONGEST_PREDICTION),
-            _ => 0.0,
-        };
+        let ratio = self.ratio(stamp);
         if self.previous.len() != self.poses.len() {
             self.previous.clone_from(&self.poses);
         }
@@ -95,14 +92,15 @@ impl Motion {
         }
     }
 
+    /// Time from the last frame to `stamp` as a multiple of the interval over which the motion was measured; 0 if it is unknown.
+    fn ratio(&self, stamp: f64) -> f64 {
+        let known = self.stamp.zip(self.interval);
+        known.map_or(0.0, |(last, interval)| ((stamp - last) / interval).min(LONGEST_PREDICTION))
+    }
+
     /// Predicts the poses at a future time and returns them.
     pub(crate) fn expect(&mut self, body: &Body, stamp: f64, damping: f64) -> &[Pose] {
-        let ratio = match (self.stamp, self.interval) {
-            (Some(last), Some(interval)) if self.previous.len() == self.poses.len() => {
-                ((stamp - last) / interval).min(LONGEST_PREDICTION)
-            }
-            _ => 0.0,
-        };
+        let ratio = if self.previous.len() == self.poses.len() { self.ratio(stamp) } else { 0.0 };
         let before = if ratio > 0.0 { &self.previous } else { &self.poses };
         predict(body, before, &self.poses, ratio * damping, &mut self.predicted);
         &self.predicted

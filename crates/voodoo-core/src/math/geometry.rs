@@ -134,8 +134,17 @@ impl Aabb {
 
     /// The bounding box of points.
     pub fn from_points(points: impl IntoIterator<Item = Vec3>) -> Self {
-        let grow = |all: Self, point| Self { mins: all.mins.min(point), maxs: all.maxs.max(point) };
-        points.into_iter().fold(Self::EMPTY, grow)
+        points.into_iter().fold(Self::EMPTY, |all, point| all.union(Self::new(point, point)))
+    }
+
+    /// The smallest box that contains both.
+    pub(crate) fn union(self, other: Self) -> Self {
+        Self { mins: self.mins.min(other.mins), maxs: self.maxs.max(other.maxs) }
+    }
+
+    /// The box with all sides moved outward by `margin` meters.
+    pub(crate) fn enlarged(self, margin: f64) -> Self {
+        Self { mins: self.mins - margin, maxs: self.maxs + margin }
     }
 
     /// The center.

@@ -45,11 +45,6 @@ fn is_static(a: &Pose, b: &Pose) -> bool {
 }
 
 impl Background {
-    /// Learned depth, row by row; empty when nothing was learned.
-    pub(crate) fn depth(&self) -> &[f32] {
-        &self.depth
-    }
-
     /// Whether a return at `z` meters in pixel `index` belongs to the background.
     #[inline(always)]
     pub(crate) fn contains(depth: f32, z: f32) -> bool {
@@ -69,11 +64,16 @@ impl Background {
 
 impl Backgrounds {
     /// The background of this image, if its camera has not moved.
-    pub(crate) fn of_image(&self, image: &DepthImage) -> Option<&Background> {
+    fn of_image(&self, image: &DepthImage) -> Option<&Background> {
         self.images.iter().find(|background| background.fits(image))
     }
 
-    /// The learned depths of this image.
+    /// The learned depths of this image, row by row; empty when nothing was learned.
+    pub(crate) fn depth(&self, image: &DepthImage) -> &[f32] {
+        self.of_image(image).map_or(&[], |background| &background.depth)
+    }
+
+    /// The learned depths of this image, to be changed.
     pub(crate) fn depth_mut(&mut self, image: &DepthImage) -> Option<&mut [f32]> {
         let known = self.images.iter_mut().find(|background| background.fits(image));
         known.map(|background| background.depth.as_mut_slice())
@@ -98,11 +98,8 @@ impl Backgrounds {
         self.images.resize_with(frame.images.len(), Background::default);
         for (number, (image, own)) in frame.images.iter().zip(&mut self.images).enumerate() {
             (own.world_from_sensor, own.width) = (Some(image.world_from_sensor), image.camera.width());
-            own.depth.clear();
-            match ownership.scene.of_image(image) {
-                Some(known) => own.depth.extend_from_slice(&known.depth),
-                None => own.depth.resize(image.pixels.len(), 0.0),
-            }
+            refill(&mut own.depth, ownership.scene.depth(image).iter().copied());
+            own.depth.resize(image.pixels.len(), 0.0);
             for (depth, owner) in own.depth.iter_mut().zip(ownership.owners(number)) {
                 *depth = if is_others(owner) { OTHERS } else { *depth };
             }
@@ -114,9 +111,8 @@ impl Backgrounds {
         let Some(image) = frame.images.get(own.image) else { return };
         let Some(depth) = self.depth_mut(image) else { return };
         for pixel in own.pixels {
-            let z = image.pixels.get(*pixel) * image.meters_per_unit as f32;
             if let Some(depth) = depth.get_mut(*pixel)
-                && (!(z > 0.0) || Background::contains(*depth, z))
+                && image.depth(*pixel).is_none_or(|z| Background::contains(*depth, z))
             {
                 *depth = 0.0;
             }
@@ -128,8 +124,7 @@ impl Backgrounds {
     pub(crate) fn register(&mut self, frame: &Frame, mut moved: impl FnMut(usize, bool)) {
         for (number, image) in frame.images.iter().enumerate() {
             if self.of_image(image).is_none() {
-                let (_, carried) = self.carry_over(image, frame);
-                moved(number, carried);
+                moved(number, self.carry_over(image, frame));
             }
         }
     }
@@ -161,7 +156,7 @@ mod tests {
             }
             backgrounds.register(&frame, |_, _| {});
             [0.0, 1.0, 2.0].map(|x| {
-                let learned = backgrounds.of_image(&image(x)).map(Background::depth);
+                let learned = backgrounds.of_image(&image(x)).map(|known| &known.depth);
                 learned.map(|depth| depth.iter().filter(|depth| **depth > 0.0).count())
             })
         };

@@ -13,10 +13,10 @@ const NEAREST_CARRIED: f32 = 0.1;
 const CRACK_STEP: f32 = 0.15;
 
 impl Backgrounds {
-    /// Returns the index of a background for an image that has none, and whether it contains learned depths. If the same camera
-    /// learned a background at another pose nearby, that one is carried over to the current pose; otherwise the background is
-    /// empty. Reuses the slot of a background that no image of the frame has.
-    pub(super) fn carry_over(&mut self, image: &DepthImage, frame: &Frame) -> (usize, bool) {
+    /// Gives an image that has none a background, and returns whether it contains learned depths. If the same camera learned a
+    /// background at another pose nearby, that one is carried over to the current pose; otherwise the background is empty. Reuses
+    /// the slot of a background that no image of the frame has.
+    pub(super) fn carry_over(&mut self, image: &DepthImage, frame: &Frame) -> bool {
         let gone = |background: &Background| !frame.images.iter().any(|image| background.fits(image));
         let from = |background: &Background| background.world_from_sensor.filter(|_| background.is_sized_like(image));
         let leap = |background: &Background| {
@@ -41,7 +41,7 @@ impl Backgrounds {
         }
         background.world_from_sensor = Some(image.world_from_sensor);
         background.width = image.camera.width();
-        (index, before.is_some())
+        before.is_some()
     }
 }
 
@@ -162,7 +162,7 @@ mod tests {
             let frame = [image(&pixels, camera, now)];
             let frame = Frame { images: &frame, ..Frame::empty(f64::from(step)) };
             backgrounds.register(&frame, |_, _| {});
-            let depth = backgrounds.of_image(&frame.images[0]).map(Background::depth).unwrap_or_default();
+            let depth = backgrounds.depth(&frame.images[0]);
             known = depth.iter().filter(|z| **z > 0.0).count();
             // Within one pixel: the step falls between two pixels.
             let beside = |index: usize| pixels[index.saturating_sub(1)..(index + 2).min(pixels.len())].iter();
@@ -189,9 +189,7 @@ mod tests {
             if now == pose(0.0, 0.0) {
                 learn(&mut backgrounds, &frame, |_| true);
             }
-            backgrounds
-                .of_image(&frame.images[0])
-                .map_or(0, |background| background.depth().iter().filter(|z| **z > 0.0).count())
+            backgrounds.depth(&frame.images[0]).iter().filter(|z| **z > 0.0).count()
         };
         assert_eq!(known(pose(0.0, 0.0)), pixels.len());
         assert_eq!(known(pose(0.002, 0.001)), pixels.len());

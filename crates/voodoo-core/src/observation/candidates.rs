@@ -3,9 +3,9 @@
 use crate::body::Body;
 use crate::config::Config;
 use crate::math::{Aabb, Mat3, Points, Pose, Vec3, shifted, vectorized};
-use crate::observation::background::{Background, Backgrounds};
 use crate::observation::clusters::Clusters;
-use crate::observation::frame::{Cloud, DepthImage, Frame, Scope};
+use crate::observation::depth_view::{DepthView, DepthViews};
+use crate::observation::frame::{Cloud, DepthImage, Scope};
 use crate::observation::pixels::{Grid, PointGate, STRETCH, Stretch};
 
 /// Marks a point that may belong to any limb.
@@ -37,13 +37,8 @@ const ROUGH_POINTS: usize = 700;
 
 /// Box around the posed body, enlarged by `margin`, in the frame of `poses`.
 pub(crate) fn body_box(body: &Body, poses: &[Pose], margin: f64) -> Aabb {
-    let mut total = Aabb::EMPTY;
-    for (limb, pose) in body.limbs().iter().zip(poses) {
-        let bounds = limb.shape.aabb(pose);
-        total.mins = total.mins.min(bounds.mins);
-        total.maxs = total.maxs.max(bounds.maxs);
-    }
-    Aabb::new(total.mins - Vec3::splat(margin), total.maxs + Vec3::splat(margin))
+    let boxes = body.limbs().iter().zip(poses).map(|(limb, pose)| limb.shape.aabb(pose));
+    boxes.fold(Aabb::EMPTY, Aabb::union).enlarged(margin)
 }
 
 impl Candidates {
@@ -57,16 +52,10 @@ impl Candidates {
         self.points.is_empty()
     }
 
-    /// Gathers the candidates of a frame. `origin` is the working frame's origin in the world, `bounds` is the enlarged
-    /// whole-body box in the working frame. Pixels of the learned backgrounds are left out.
-    pub(crate) fn gather(
-        &mut self,
-        frame: &Frame,
-        origin: Vec3,
-        bounds: &Aabb,
-        backgrounds: &Backgrounds,
-        config: &Config,
-    ) {
+    /// Gathers the candidates of a frame; `bounds` is the enlarged whole-body box in the working frame. Pixels of the learned
+    /// backgrounds are left out.
+    pub(crate) fn gather(&mut self, views: DepthViews, bounds: &Aabb, config: &Config) {
+        let DepthViews { frame, backgrounds, origin, .. } = views;
         self.clear();
         let (up, floor) = match frame.ground {
             Some(ground) => (ground.normal, ground.relative_to(origin).offset + config.ground_clearance),
@@ -75,10 +64,9 @@ impl Candidates {
         let to_f32 = |v: Vec3| v.to_array().map(|value| value as f32);
         let gate =
             PointGate { low: to_f32(bounds.mins), high: to_f32(bounds.maxs), up: to_f32(up), floor: floor as f32 };
-        for image in frame.images {
-            let background = backgrounds.of_image(image).map_or(&[][..], Background::depth);
-            self.gather_image(image, background, origin, bounds, &gate, config.max_points);
-            self.cameras.push((self.points.len() as u32, image.world_from_sensor.translation - origin));
+        for view in views.iter() {
+            self.gather_image(&view, bounds, &gate, config.max_points);
+            self.cameras.push((self.points.len() as u32, view.working_from_camera.translation));
         }
         for (number, cloud) in frame.clouds.iter().enumerate() {
             self.gather_cloud(cloud, origin, &gate, |point| backgrounds.is_others(number, point));
@@ -180,21 +168,13 @@ impl Candidates {
         }
     }
 
-    fn gather_image(
-        &mut self,
-        image: &DepthImage,
-        background: &[f32],
-        origin: Vec3,
-        bounds: &Aabb,
-        gate: &PointGate,
-        max_points: usize,
-    ) {
-        let working_from_sensor = shifted(&image.world_from_sensor, origin);
-        let [columns, rows] = image_window(image, &working_from_sensor, bounds);
-        let m = columns_f32(&working_from_sensor);
+    fn gather_image(&mut self, view: &DepthView, bounds: &Aabb, gate: &PointGate, max_points: usize) {
+        let DepthView { image, working_from_camera, .. } = *view;
+        let [columns, rows] = image_window(image, &working_from_camera, bounds);
+        let m = columns_f32(&working_from_camera);
         let points = &mut self.points;
         // A pixel represents a patch of surface: its size follows from the distance of the body.
-        let distance = working_from_sensor.inverse_transform_point(bounds.center()).length().max(NEAREST_BODY);
+        let distance = working_from_camera.inverse_transform_point(bounds.center()).length().max(NEAREST_BODY);
         let [fx, fy] = image.camera.focal();
         let patch = distance * distance / (fx * fy);
         let grid = Grid::new(VISIBLE_AREA / patch / max_points as f64);
@@ -206,7 +186,7 @@ impl Candidates {
                 let offset = grid.offset(row);
                 let first = (columns.start + stride - offset).next_multiple_of(stride) - stride + offset;
                 for start in (first..columns.end).step_by(STRETCH * stride) {
-                    let stretch = Stretch::load(image, background, row, start, columns.end, stride);
+                    let stretch = Stretch::load(view, row, start..columns.end, stride);
                     if stretch.returned() {
                         stretch.gather(&m, gate, points);
                     }
@@ -247,8 +227,9 @@ pub(super) fn columns_f32(pose: &Pose) -> [[f32; 3]; 4] {
 mod tests {
     use super::*;
     use crate::math::Quat;
-    use crate::observation::frame::{Ground, PointSlice};
-    use crate::testing::image;
+    use crate::observation::background::{Background, Backgrounds};
+    use crate::observation::frame::{Frame, Ground, PointSlice};
+    use crate::testing::{image, views};
 
     #[test]
     fn candidates_are_the_returns_in_the_box_above_the_floor_and_before_the_scene() {
@@ -271,7 +252,8 @@ mod tests {
         let bounds = Aabb::new(Vec3::new(-0.4, -0.3, -0.6), Vec3::new(0.4, 0.5, 0.4));
         let config = Config { max_points: 1_000_000, ..Config::default() };
         let mut found = Candidates::default();
-        found.gather(&frame, origin, &bounds, &backgrounds, &config);
+        let views = DepthViews { frame: &frame, backgrounds: &backgrounds, segmented: &[false], origin };
+        found.gather(views, &bounds, &config);
         // The reference: one pixel after the other, in double precision.
         let expected: Vec<Vec3> = (0..pixels.len())
             .filter(|index| pixels[*index] > 0.0)
@@ -327,7 +309,7 @@ mod tests {
             let clouds = [cloud(scope)];
             let frame = Frame { clouds: &clouds, ..Frame::empty(0.0) };
             let mut found = Candidates::default();
-            found.gather(&frame, Vec3::ZERO, &bounds, &Backgrounds::default(), &Config::default());
+            found.gather(views(&frame, &Backgrounds::default()), &bounds, &Config::default());
             assert_eq!((found.len(), &found.limb[..]), (count, &vec![limb; count][..]), "{scope:?}");
             assert_eq!(found.weight, vec![2.0; count]);
         }

@@ -1,7 +1,7 @@
 //! What the pixels of a depth image show at a position in space.
 
 use crate::camera::NEAREST_RETURN;
-use crate::math::{Pose, Vec3, shifted};
+use crate::math::{Pose, Vec3, refill, shifted};
 use crate::observation::background::{Background, Backgrounds, OTHERS};
 use crate::observation::frame::{DepthImage, Frame};
 
@@ -10,8 +10,8 @@ use crate::observation::frame::{DepthImage, Frame};
 pub(crate) struct DepthView<'a> {
     /// The image.
     pub image: &'a DepthImage<'a>,
-    /// The learned depth of the scene behind the body.
-    pub background: Option<&'a Background>,
+    /// The learned depth of the scene behind the body, row by row; empty where it is not known.
+    pub background: &'a [f32],
     /// Pose of the camera in the working frame.
     pub working_from_camera: Pose,
     /// Whether the body was segmented (cut out) before the image was passed in: then a pixel without return is free space.
@@ -55,7 +55,7 @@ impl<'a> DepthViews<'a> {
         let images = self.frame.images.iter().zip(self.segmented);
         images.map(move |(image, segmented)| DepthView {
             image,
-            background: self.backgrounds.of_image(image),
+            background: self.backgrounds.depth(image),
             working_from_camera: shifted(&image.world_from_sensor, self.origin),
             segmented: *segmented,
         })
@@ -81,8 +81,7 @@ impl DepthView<'_> {
         if z.is_nan() || z <= 0.0 {
             return if self.segmented { Pixel::Background(f64::INFINITY) } else { Pixel::Unknown };
         }
-        let scene = self.background.and_then(|background| background.depth().get(index));
-        match scene {
+        match self.background.get(index) {
             Some(depth) if Background::contains(*depth, z as f32) => {
                 if *depth == OTHERS {
                     Pixel::Other(z)
@@ -150,15 +149,12 @@ pub(crate) struct Shares {
 
 /// Finds in which images of a frame the body was segmented, and writes the result to `found`.
 pub(crate) fn find_segmented(frame: &Frame, found: &mut Vec<bool>) {
-    found.clear();
-    found.extend(frame.images.iter().map(|image| {
-        let (mut none, mut all) = (0_u32, 0_u32);
-        for index in (0..image.pixels.len()).step_by(SEGMENTED_STEP) {
-            all += 1;
-            none += u32::from(image.pixels.get(index) <= 0.0);
-        }
-        f64::from(none) > SEGMENTED_FRACTION * f64::from(all)
-    }));
+    let is_segmented = |image: &DepthImage| {
+        let tested = (0..image.pixels.len()).step_by(SEGMENTED_STEP);
+        let none = tested.clone().filter(|index| image.pixels.get(*index) <= 0.0).count();
+        none as f64 > SEGMENTED_FRACTION * tested.len() as f64
+    };
+    refill(found, frame.images.iter().map(is_segmented));
 }
 
 #[cfg(test)]
@@ -183,7 +179,7 @@ mod tests {
             let camera = Camera::new(24, 16, [20.0, 20.0, 11.5, 7.5], lens).unwrap();
             let image = DepthImage { camera: &camera, ..image(&pixels, 24, 20.0) };
             let view =
-                DepthView { image: &image, background: None, working_from_camera: Pose::IDENTITY, segmented: false };
+                DepthView { image: &image, background: &[], working_from_camera: Pose::IDENTITY, segmented: false };
             for (index, depth) in pixels.iter().enumerate() {
                 let [column, row] = [index % 24, index / 24].map(|at| at as f64);
                 for (z, u, v) in [(0.3, 0.0, 0.0), (2.0, 0.45, -0.45), (9.0, -0.45, 0.45)] {
@@ -200,7 +196,7 @@ mod tests {
     fn a_place_is_visible_in_the_pixel_whose_ray_passes_nearest() {
         let pixels = distinct(24 * 16);
         let image = image(&pixels, 24, 20.0);
-        let view = DepthView { image: &image, background: None, working_from_camera: Pose::IDENTITY, segmented: false };
+        let view = DepthView { image: &image, background: &[], working_from_camera: Pose::IDENTITY, segmented: false };
         for (index, depth) in pixels.iter().enumerate() {
             // Anywhere within the pixel, and at any depth: its borders are half a pixel from its center.
             for (z, u, v) in [(0.3, 0.0, 0.0), (2.0, 0.45, -0.45), (9.0, -0.45, 0.45)] {

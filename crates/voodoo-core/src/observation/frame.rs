@@ -1,5 +1,7 @@
 //! All measurements of one instant, from any number of sensors (K06 IV-A). Data is borrowed: nothing is copied on input.
 
+use std::fmt::Display;
+
 use crate::body::Body;
 use crate::camera::Camera;
 use crate::error::TrackError;
@@ -161,6 +163,13 @@ impl DepthImage<'_> {
     pub fn back_project(&self, index: usize, z: f32) -> Vec3 {
         let [x, y] = self.camera.pixel_ray(index % self.camera.width(), index / self.camera.width());
         f64::from(z) * Vec3::new(x, y, 1.0)
+    }
+
+    /// The measured depth of a pixel, meters; `None` without a return.
+    #[inline(always)]
+    pub(crate) fn depth(&self, index: usize) -> Option<f32> {
+        let z = self.pixels.get(index) * self.meters_per_unit as f32;
+        (z > 0.0 && z.is_finite()).then_some(z)
     }
 
     /// Returns the measured depth at the pixel that a world point projects to (0 for no return) and the depth of the point
@@ -369,21 +378,20 @@ impl<'a> Frame<'a> {
     /// Depth images and point clouds may hold NaN only where the sensor had no return. In a depth image it counts as "no
     /// return"; in a cloud it is an error (drop such rows before).
     pub fn check(&self, body: &Body, previous_stamp: Option<f64>) -> Result<(), TrackError> {
-        let stamp = || self.stamp.to_string();
-        TrackError::unless(self.stamp.is_finite(), || "stamp".into(), "a finite time in seconds", stamp)?;
+        TrackError::unless(self.stamp.is_finite(), "stamp", "a finite time in seconds", self.stamp)?;
         if let Some(previous) = previous_stamp.filter(|previous| *previous >= self.stamp) {
             return Err(TrackError::TimeBackwards { previous, found: self.stamp });
         }
         for (index, cloud) in self.clouds.iter().enumerate() {
-            let what = |part: &str| format!("points[{index}].{part}");
-            check_weight(|| what("weight"), cloud.weight)?;
-            check_pose(|| what("world_from_sensor"), &cloud.world_from_sensor)?;
+            check_weight(format_args!("points[{index}].weight"), cloud.weight)?;
+            check_pose(format_args!("points[{index}].world_from_sensor"), &cloud.world_from_sensor)?;
             if let Scope::Limb(limb) = cloud.scope {
-                check_index(|| what("limb"), "the index of a limb", limb, body.limbs().len())?;
+                let what = format_args!("points[{index}].limb");
+                check_index(what, "the index of a limb", limb, body.limbs().len())?;
             }
             if let Some(row) = (0..cloud.points.len()).find(|row| !is_place(cloud.points.get(*row))) {
                 let found = format!("{:?} in row {row}", cloud.points.get(row).to_array());
-                return Err(TrackError::measurement(what("points"), "finite meters, 1e9 at most", found));
+                return Err(TrackError::measurement(format!("points[{index}].points"), PLACE, found));
             }
         }
         for (index, image) in self.images.iter().enumerate() {
@@ -393,25 +401,23 @@ impl<'a> Frame<'a> {
             picture.check(index, self.stamp, &self.colors[..index])?;
         }
         for (index, relation) in self.positions.iter().enumerate() {
-            check_position(|| format!("positions[{index}]"), relation, body)?;
+            check_position(format_args!("positions[{index}]"), relation, body)?;
         }
         for (index, detection) in self.detections.iter().enumerate() {
             for (number, relation) in detection.positions.iter().enumerate() {
-                check_position(|| format!("detections[{index}].positions[{number}]"), relation, body)?;
+                check_position(format_args!("detections[{index}].positions[{number}]"), relation, body)?;
             }
-            let what = || format!("detections[{index}].person");
-            TrackError::unless(!detection.person.is_nan(), what, "log odds", || "NaN".into())?;
+            let what = format_args!("detections[{index}].person");
+            TrackError::unless(!detection.person.is_nan(), what, "log odds", "NaN")?;
         }
         for (index, relation) in self.rays.iter().enumerate() {
-            let what = |part: &str| format!("rays[{index}].{part}");
-            check_index(|| what("site"), "the index of a site", relation.site, body.sites().len())?;
-            check_weight(|| what("weight"), relation.weight)?;
-            check_bias(|| what("bias"), relation.bias)?;
-            check_vector(|| what("origin"), relation.origin)?;
-            check_vector(|| what("direction"), relation.direction)?;
-            let found = || format!("{:?}", relation.direction.to_array());
-            let known = relation.direction.length() >= 1e-9;
-            TrackError::unless(known, || what("direction"), "a vector that is not zero", found)?;
+            let what = format_args!("rays[{index}]");
+            check_relation(what, relation.site, relation.weight, relation.bias, body)?;
+            check_place(format_args!("{what}.origin"), relation.origin)?;
+            check_place(format_args!("{what}.direction"), relation.direction)?;
+            let (known, found) = (relation.direction.length() >= 1e-9, relation.direction.to_array());
+            let (what, found) = (format_args!("{what}.direction"), format_args!("{found:?}"));
+            TrackError::unless(known, what, "a vector that is not zero", found)?;
         }
         self.check_scene()
     }
@@ -420,61 +426,61 @@ impl<'a> Frame<'a> {
     fn check_scene(&self) -> Result<(), TrackError> {
         if let Some(Ground { normal, offset }) = self.ground {
             let valid = offset.is_finite() && normal.is_normalized();
-            let found = || format!("normal {:?} and offset {offset}", normal.to_array());
-            TrackError::unless(valid, || "ground".into(), "a unit normal and a finite offset", found)?;
+            let found = format_args!("normal {:?} and offset {offset}", normal.to_array());
+            TrackError::unless(valid, "ground", "a unit normal and a finite offset", found)?;
         }
         for (index, Aabb { mins, maxs }) in self.excluded.iter().enumerate() {
             let valid = mins.is_finite() && maxs.is_finite() && mins.cmple(*maxs).all();
-            let found = || format!("{:?} to {:?}", mins.to_array(), maxs.to_array());
-            TrackError::unless(valid, || format!("excluded[{index}]"), "a low and a high corner", found)?;
+            let found = format_args!("{:?} to {:?}", mins.to_array(), maxs.to_array());
+            TrackError::unless(valid, format_args!("excluded[{index}]"), "a low and a high corner", found)?;
         }
         Ok(())
     }
 }
 
 fn check_image(index: usize, image: &DepthImage) -> Result<(), TrackError> {
-    let (what, unit) = (|part: &str| format!("depth[{index}].{part}"), image.meters_per_unit);
-    check_size(|| what("image"), image.pixels.len(), image.camera)?;
-    let expected = "a finite length above zero";
-    TrackError::unless(unit > 0.0 && unit.is_finite(), || what("meters_per_unit"), expected, || unit.to_string())?;
-    check_weight(|| what("weight"), image.weight)?;
-    check_pose(|| what("world_from_sensor"), &image.world_from_sensor)
+    let (what, unit) = (format_args!("depth[{index}]"), image.meters_per_unit);
+    check_size(format_args!("{what}.image"), image.pixels.len(), image.camera)?;
+    let valid = unit > 0.0 && unit.is_finite();
+    TrackError::unless(valid, format_args!("{what}.meters_per_unit"), "a finite length above zero", unit)?;
+    check_weight(format_args!("{what}.weight"), image.weight)?;
+    check_pose(format_args!("{what}.world_from_sensor"), &image.world_from_sensor)
 }
 
 /// Rejects an image that has not a value for every pixel of its camera.
-pub(super) fn check_size(what: impl FnOnce() -> String, pixels: usize, camera: &Camera) -> Result<(), TrackError> {
-    let found = || format!("{pixels} for {}x{}", camera.width(), camera.height());
+pub(super) fn check_size(what: impl Display, pixels: usize, camera: &Camera) -> Result<(), TrackError> {
+    let found = format_args!("{pixels} for {}x{}", camera.width(), camera.height());
     TrackError::unless(pixels == camera.pixels(), what, "all pixels of the camera", found)
 }
 
-fn check_position(what: impl Fn() -> String, relation: &PositionRelation, body: &Body) -> Result<(), TrackError> {
-    check_index(|| what() + ".site", "the index of a site", relation.site, body.sites().len())?;
-    check_weight(|| what() + ".weight", relation.weight)?;
-    check_bias(|| what() + ".bias", relation.bias)?;
-    check_vector(|| what() + ".position", relation.position)
+fn check_position(what: impl Display, relation: &PositionRelation, body: &Body) -> Result<(), TrackError> {
+    check_relation(&what, relation.site, relation.weight, relation.bias, body)?;
+    check_place(format_args!("{what}.position"), relation.position)
 }
 
-fn check_index(
-    what: impl FnOnce() -> String,
-    expected: &'static str,
-    index: usize,
-    count: usize,
-) -> Result<(), TrackError> {
-    TrackError::unless(index < count, what, expected, || index.to_string())
+fn check_relation(what: impl Display, site: usize, weight: f64, bias: f64, body: &Body) -> Result<(), TrackError> {
+    check_index(format_args!("{what}.site"), "the index of a site", site, body.sites().len())?;
+    check_weight(format_args!("{what}.weight"), weight)?;
+    let valid = bias.is_finite() && bias >= 0.0;
+    TrackError::unless(valid, format_args!("{what}.bias"), "a finite length, zero or above", bias)
 }
 
-fn check_weight(what: impl FnOnce() -> String, weight: f64) -> Result<(), TrackError> {
-    TrackError::unless(weight.is_finite() && weight > 0.0, what, "a finite weight above zero", || weight.to_string())
+fn check_index(what: impl Display, expected: &'static str, index: usize, count: usize) -> Result<(), TrackError> {
+    TrackError::unless(index < count, what, expected, index)
 }
 
-fn check_bias(what: impl FnOnce() -> String, bias: f64) -> Result<(), TrackError> {
-    TrackError::unless(bias.is_finite() && bias >= 0.0, what, "a finite length, zero or above", || bias.to_string())
+fn check_weight(what: impl Display, weight: f64) -> Result<(), TrackError> {
+    TrackError::unless(weight.is_finite() && weight > 0.0, what, "a finite weight above zero", weight)
 }
 
-fn check_vector(what: impl FnOnce() -> String, vector: Vec3) -> Result<(), TrackError> {
-    TrackError::unless(is_place(vector), what, "finite meters, 1e9 at most", || format!("{:?}", vector.to_array()))
+/// What is expected of a position.
+const PLACE: &str = "finite meters, 1e9 at most";
+
+/// Rejects a position that is not valid.
+fn check_place(what: impl Display, place: Vec3) -> Result<(), TrackError> {
+    TrackError::unless(is_place(place), what, PLACE, format_args!("{:?}", place.to_array()))
 }
 
-pub(crate) fn check_pose(what: impl FnOnce() -> String, pose: &Pose) -> Result<(), TrackError> {
-    TrackError::unless(is_rigid(pose), what, "a rigid transform", || format!("{pose:?}"))
+pub(crate) fn check_pose(what: impl Display, pose: &Pose) -> Result<(), TrackError> {
+    TrackError::unless(is_rigid(pose), what, "a rigid transform", format_args!("{pose:?}"))
 }

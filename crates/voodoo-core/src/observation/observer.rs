@@ -96,8 +96,9 @@ impl Observer {
         ownership: OwnershipMask,
         config: &Config,
     ) {
-        let scene = if self.is_masked { &self.masked } else { ownership.scene };
-        self.candidates.gather(frame, origin, bounds, scene, config);
+        let backgrounds = if self.is_masked { &self.masked } else { ownership.scene };
+        let views = DepthViews { frame, backgrounds, segmented: &self.segmented, origin };
+        self.candidates.gather(views, bounds, config);
     }
 
     /// The observation of `frame`.

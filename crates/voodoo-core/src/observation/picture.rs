@@ -85,12 +85,13 @@ pub struct ColorImage<'a> {
 impl ColorImage<'_> {
     /// Returns an error for an unusable image; `index` is its index in a frame with this `stamp`, after `others`.
     pub(super) fn check(&self, index: usize, stamp: f64, others: &[Self]) -> Result<(), TrackError> {
-        let what = |part: &str| format!("color[{index}].{part}");
-        let (near, found) = ((self.stamp - stamp).abs() <= LONGEST_ASIDE, || self.stamp.to_string());
-        TrackError::unless(near, || what("stamp"), "a time within 0.25 s of the frame's", found)?;
-        check_size(|| what("image"), self.pixels.len(), self.camera)?;
-        check_pose(|| what("world_from_sensor"), &self.world_from_sensor)?;
-        let (first, found) = (others.iter().all(|other| other.number != self.number), || "a second one of this".into());
-        TrackError::unless(first, || what("source"), "one picture of each camera", found)
+        let (what, near) = (format_args!("color[{index}]"), (self.stamp - stamp).abs() <= LONGEST_ASIDE);
+        let expected = "a time within 0.25 s of the frame's";
+        TrackError::unless(near, format_args!("{what}.stamp"), expected, self.stamp)?;
+        check_size(format_args!("{what}.image"), self.pixels.len(), self.camera)?;
+        check_pose(format_args!("{what}.world_from_sensor"), &self.world_from_sensor)?;
+        let first = others.iter().all(|other| other.number != self.number);
+        let (what, found) = (format_args!("{what}.source"), "a second one of this");
+        TrackError::unless(first, what, "one picture of each camera", found)
     }
 }

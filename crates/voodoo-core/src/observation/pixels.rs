@@ -1,8 +1,11 @@
 //! Converts the pixels of a depth image to points: selects which are used, and processes part of a row at a time on SIMD lanes.
 
+use std::ops::Range;
+
 use crate::math::Points;
 use crate::observation::background::Background;
-use crate::observation::frame::{DepthImage, DepthPixels};
+use crate::observation::depth_view::DepthView;
+use crate::observation::frame::DepthPixels;
 
 /// An axis-aligned box, a half space and a shift in single precision, in the form that the per-point test needs.
 pub(super) struct PointGate {
@@ -67,16 +70,10 @@ pub(super) struct Stretch {
 
 impl Stretch {
     #[inline(always)]
-    pub(super) fn load(
-        image: &DepthImage,
-        background: &[f32],
-        row: usize,
-        start: usize,
-        end: usize,
-        stride: usize,
-    ) -> Self {
-        let count = STRETCH.min((end - start).div_ceil(stride));
-        let first = row * image.camera.width() + start;
+    pub(super) fn load(view: &DepthView, row: usize, columns: Range<usize>, stride: usize) -> Self {
+        let DepthView { image, background, .. } = view;
+        let count = STRETCH.min((columns.end - columns.start).div_ceil(stride));
+        let first = row * image.camera.width() + columns.start;
         let scale = image.meters_per_unit as f32;
         let mut z = [0.0; STRETCH];
         match image.pixels {
@@ -92,7 +89,7 @@ impl Stretch {
                 *z = if Background::contains(*depth, *z) { 0.0 } else { *z };
             });
         }
-        let [x, y] = image.camera.row_rays(row, start, stride, count);
+        let [x, y] = image.camera.row_rays(row, columns.start, stride, count);
         Self { x, y, z }
     }
 

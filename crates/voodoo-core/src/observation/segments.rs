@@ -1,10 +1,10 @@
 //! Cuts the foreground of a frame into connected segments: each may be a lost body.
 
 use crate::config::Config;
-use crate::math::{Vec3, reset};
-use crate::observation::background::{Background, Backgrounds};
+use crate::math::{Aabb, Vec3, reset};
+use crate::observation::background::Background;
 use crate::observation::candidates::REFERENCE_PATCH;
-use crate::observation::frame::Frame;
+use crate::observation::depth_view::{DepthView, DepthViews};
 
 /// Approximate number of samples per source: a search runs while the body is lost, and must keep up with the frame rate.
 const SAMPLES_PER_SOURCE: usize = 5000;
@@ -20,10 +20,8 @@ const HALF_KEY: f64 = (1_u64 << 20) as f64;
 pub(crate) struct Segment {
     /// Centroid of the samples.
     pub center: Vec3,
-    /// Minimum corner of the bounding box.
-    pub low: Vec3,
-    /// Maximum corner of the bounding box.
-    pub high: Vec3,
+    /// Bounding box.
+    pub bounds: Aabb,
     /// Visible surface area, in patches.
     pub patches: f64,
 }
@@ -59,10 +57,11 @@ impl Segments {
         &self.found
     }
 
-    /// Segments a whole frame. `origin` is the working frame's origin in the world.
-    pub(crate) fn find(&mut self, frame: &Frame, origin: Vec3, backgrounds: &Backgrounds, config: &Config) {
+    /// Segments a whole frame.
+    pub(crate) fn find(&mut self, views: DepthViews, config: &Config) {
+        let DepthViews { frame, origin, .. } = views;
         self.samples.clear();
-        self.sample_images(frame, origin, backgrounds);
+        self.sample_images(views);
         for cloud in frame.clouds {
             let step = cloud.points.len().div_ceil(SAMPLES_PER_SOURCE).max(1);
             for index in (0..cloud.points.len()).step_by(step) {
@@ -102,20 +101,18 @@ impl Segments {
         self.samples.push(Sample { key, point, weight: weight as f32 });
     }
 
-    fn sample_images(&mut self, frame: &Frame, origin: Vec3, backgrounds: &Backgrounds) {
-        for image in frame.images {
-            let background = backgrounds.of_image(image).map_or(&[][..], Background::depth);
+    fn sample_images(&mut self, views: DepthViews) {
+        for DepthView { image, background, .. } in views.iter() {
             let step = ((image.pixels.len() as f64 / SAMPLES_PER_SOURCE as f64).sqrt().ceil() as usize).max(1);
             let [fx, fy] = image.camera.focal();
             let spread = (step * step) as f64 / (fx * fy * REFERENCE_PATCH);
             for row in (0..image.camera.height()).step_by(step) {
                 for pixel in (row * image.camera.width()..(row + 1) * image.camera.width()).step_by(step) {
-                    let z = image.pixels.get(pixel) * image.meters_per_unit as f32;
-                    let returned = z > 0.0 && z.is_finite();
-                    if !returned || background.get(pixel).is_some_and(|depth| Background::contains(*depth, z)) {
+                    let Some(z) = image.depth(pixel) else { continue };
+                    if background.get(pixel).is_some_and(|depth| Background::contains(*depth, z)) {
                         continue;
                     }
-                    let point = image.world_from_sensor * image.back_project(pixel, z) - origin;
+                    let point = image.world_from_sensor * image.back_project(pixel, z) - views.origin;
                     self.push(point, image.weight * spread * f64::from(z * z));
                 }
             }
@@ -125,15 +122,11 @@ impl Segments {
     fn fill_cells(&mut self) {
         self.cells.clear();
         let mut start = 0;
-        for end in 1..=self.samples.len() {
-            if end < self.samples.len() && self.samples[end].key == self.samples[start].key {
-                continue;
-            }
-            let weight: f32 = self.samples[start..end].iter().map(|sample| sample.weight).sum();
-            if weight >= LEAST_PATCHES {
+        for samples in self.samples.chunk_by(|a, b| a.key == b.key) {
+            let end = start + samples.len() as u32;
+            if samples.iter().map(|sample| sample.weight).sum::<f32>() >= LEAST_PATCHES {
                 let parent = self.cells.len() as u32;
-                let samples = (start as u32, end as u32);
-                self.cells.push(Cell { key: self.samples[start].key, samples, parent });
+                self.cells.push(Cell { key: samples[0].key, samples: (start, end), parent });
             }
             start = end;
         }
@@ -174,8 +167,7 @@ impl Segments {
             let first = self.first(index as u32) as usize;
             if first == index {
                 self.of_cell[index] = self.found.len() as u32;
-                let (low, high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-                self.found.push(Segment { center: Vec3::ZERO, low, high, patches: 0.0 });
+                self.found.push(Segment { center: Vec3::ZERO, bounds: Aabb::EMPTY, patches: 0.0 });
             }
             let segment = &mut self.found[self.of_cell[first] as usize];
             let (start, end) = self.cells[index].samples;
@@ -183,8 +175,7 @@ impl Segments {
                 let weight = f64::from(sample.weight);
                 let point = Vec3::from_array(sample.point.map(f64::from));
                 segment.center += weight * point;
-                segment.low = segment.low.min(point);
-                segment.high = segment.high.max(point);
+                segment.bounds = segment.bounds.union(Aabb::new(point, point));
                 segment.patches += weight;
             }
         }
@@ -206,7 +197,9 @@ fn order(a: &[f64; 3], b: &[f64; 3]) -> std::cmp::Ordering {
 mod tests {
     use super::*;
     use crate::math::Pose;
-    use crate::observation::frame::{Cloud, PointSlice, Scope};
+    use crate::observation::background::Backgrounds;
+    use crate::observation::frame::{Cloud, Frame, PointSlice, Scope};
+    use crate::testing::views;
 
     #[test]
     fn points_apart_are_segments_largest_first_and_strays_are_none() {
@@ -227,7 +220,7 @@ mod tests {
             }];
             let frame = Frame { clouds: &clouds, ..Frame::empty(0.0) };
             let mut segments = Segments::default();
-            segments.find(&frame, Vec3::ZERO, &Backgrounds::default(), &Config::default());
+            segments.find(views(&frame, &Backgrounds::default()), &Config::default());
             found.push(segments.found().to_vec());
             // A different order of the same points gives bitwise identical segments.
             points.reverse();

@@ -2,14 +2,12 @@
 
 use super::clothes::Clothes;
 use super::person::Person;
-use super::pixel_assignment::PredictedBody;
 use super::tentative_tracks::{SAME_PERSON, TentativeTrack};
 use super::{ONE_BODY, People, Refusal, assign};
 use crate::body::{Body, Model};
 use crate::config::SolverKind;
 use crate::detect::{Detected, DetectionQuery, PlacedDetection, Surroundings, fit_body};
 use crate::math::{Pose, Vec3};
-use crate::observation::background::Background;
 use crate::observation::frame::{DepthImage, Frame, PositionRelation};
 use crate::observation::ownership::NO_OWNER;
 
@@ -122,8 +120,10 @@ impl People {
                 let Some(one) = found.get(next) else { break };
                 let detected = Detected { detection: &one.detection, map: self.detector.map() };
                 newcomers.extend(fit_body(&Model::new(self.prototype.clone()), detected));
-                self.assign_segment(frame, number, &one.detection.pixels, &newcomers);
-                if let Some(place) = self.rest_of_segment(&frame.images[number], number, &one.detection.pixels) {
+                // Newcomers are numbered after all persons.
+                let (image, pixels) = (&frame.images[number], &one.detection.pixels);
+                self.assignment.assign_segment(image, number, pixels, self.persons.len(), &newcomers);
+                if let Some(place) = self.rest_of_segment(image, number, pixels) {
                     found.extend(self.detect_in_image(frame, number, DetectionQuery::Near(place)));
                 }
             }
@@ -138,7 +138,7 @@ impl People {
     /// Returns the persons who are detected in an image, and are to be tracked.
     fn detect_in_image(&mut self, frame: &Frame, number: usize, query: DetectionQuery) -> Vec<PlacedDetection> {
         let image = &frame.images[number];
-        let scene = self.scene.known().of_image(image).map_or(&[][..], Background::depth);
+        let scene = self.scene.known().depth(image);
         let around = Surroundings {
             ground: frame.ground,
             excluded: frame.excluded,
@@ -156,16 +156,6 @@ impl People {
             requested
         });
         found
-    }
-
-    /// Assigns pixels of a segment to newcomers, who are numbered after all persons.
-    fn assign_segment(&mut self, frame: &Frame, image: usize, pixels: &[usize], newcomers: &[(Body, Vec<Pose>)]) {
-        let bodies = (self.persons.len() as u16..).zip(newcomers).map(|(number, (body, poses))| PredictedBody {
-            number,
-            body,
-            poses,
-        });
-        self.assignment.assign_segment(&frame.images[image], image, pixels, bodies);
     }
 
     /// Returns the middle of those pixels of a segment that nobody owns, world frame, if these are many.
@@ -208,7 +198,7 @@ impl People {
         let tracks: Vec<&TentativeTrack> = confirmed.iter().chain(self.tentative.updated_at(frame.stamp)).collect();
         let costs: Vec<Vec<f64>> = tracks.iter().copied().enumerate().map(cost).collect();
         // A detection that nobody is left for may be of somebody new, or of nobody.
-        let known = assign::assign(&costs, |row| tracks[row].log_odds().min(NEW));
+        let known = assign::assign(&costs, |row| tracks[row].log_odds.min(NEW));
         let known: Vec<Option<usize>> = known.into_iter().map(|column| column.map(|column| absent[column])).collect();
         let numbers = self.assign_to_newcomers(frame, confirmed, &known);
         for ((track, known), own) in confirmed.iter().zip(known).zip(numbers) {
@@ -258,7 +248,8 @@ impl People {
         }
         newcomers.extend(self.tentative.updated_at(frame.stamp).filter_map(|track| self.fit_track(track)));
         for track in confirmed.iter().filter(|track| !track.detection.pixels.is_empty()) {
-            self.assign_segment(frame, track.image, &track.detection.pixels, &newcomers);
+            let (image, pixels) = (&frame.images[track.image], &track.detection.pixels);
+            self.assignment.assign_segment(image, track.image, pixels, first, &newcomers);
         }
         numbers
     }

@@ -1,7 +1,7 @@
 //! Color histograms of a person's clothes, above and below the waist.
 
 use crate::body::{Body, LimbRole};
-use crate::math::{Pose, Vec3};
+use crate::math::{Pose, Vec3, reset};
 use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::picture::ColorImage;
 use crate::visibility::surface::surface_rows;
@@ -40,8 +40,7 @@ impl Clothes {
     pub(super) fn observe(&mut self, frame: &Frame, body: &Body, poses: &[Pose], own: impl Fn(usize, usize) -> bool) {
         let Self { worn, counts } = self;
         for (half, histogram) in worn.iter_mut().enumerate() {
-            counts.clear();
-            counts.resize(BINS.iter().product(), 0.0);
+            reset(counts, BINS.iter().product(), 0.0);
             let mut places = 0;
             for (index, (limb, pose)) in body.limbs().iter().zip(poses).enumerate() {
                 if body.roles().limb(index).and_then(half_of) != Some(half) {

@@ -27,7 +27,6 @@ use births::NEW;
 pub use options::PeopleOptions;
 use person::Person;
 use pixel_assignment::{PixelAssignment, PredictedBody};
-use rayon::prelude::*;
 pub use refusal::Refusal;
 use scene_model::SceneModel;
 use tentative_tracks::{SAME_PERSON, TentativeTracks};
@@ -254,11 +253,7 @@ impl People {
                 person.update(frame, ownership);
             }
         };
-        match self.threads.pool() {
-            // Each person is processed by a single thread, so the result does not depend on the number of threads.
-            Some(pool) => pool.install(|| self.persons.par_iter_mut().enumerate().for_each(work)),
-            None => self.persons.iter_mut().enumerate().for_each(work),
-        }
+        self.threads.each(&mut self.persons, work);
     }
 
     /// Prunes tracks: duplicates (the one that explains fewer pixels, or the newer), and tracks outside the region or not

@@ -129,24 +129,20 @@ impl Person {
         if self.stays {
             return;
         }
-        let patience = match self.presence(frame) {
-            Presence::Hidden => HIDDEN,
-            Presence::Outside => OUTSIDE,
-            Presence::Gone => LEAVES,
-        };
         if self.last_tracked >= self.counted {
             (self.absence, self.counted) = (0.0, self.last_tracked);
         }
-        self.absence += (frame.stamp - self.counted) / patience;
+        self.absence += (frame.stamp - self.counted) / self.patience(frame);
         self.counted = frame.stamp;
         self.present &= self.absence < 1.0;
     }
 
-    /// Returns whether most sites of the lost person are hidden, outside of the images, or neither.
-    fn presence(&self, frame: &Frame) -> Presence {
+    /// Returns the time after which the lost person becomes absent, seconds: by whether most of their sites are hidden, outside of
+    /// the images, or neither.
+    fn patience(&self, frame: &Frame) -> f64 {
         if frame.images.is_empty() {
             // A frame without depth images is no evidence that a person left.
-            return Presence::Hidden;
+            return HIDDEN;
         }
         let sites = &self.tracker.estimate().sites;
         let (mut hidden, mut outside) = (0, 0);
@@ -156,9 +152,9 @@ impl Person {
             hidden += usize::from(depths().any(|[z, place]| z > 0.0 && z < place - HIDES));
         }
         match sites.len() / 2 {
-            half if hidden > half => Presence::Hidden,
-            half if outside > half => Presence::Outside,
-            _ => Presence::Gone,
+            half if hidden > half => HIDDEN,
+            half if outside > half => OUTSIDE,
+            _ => LEAVES,
         }
     }
 }
@@ -167,12 +163,4 @@ impl Person {
 fn stature(detected: Detected) -> Option<[f64; 2]> {
     let [length, sigma] = detected.length(detected.map.stature()?)?;
     Some([length.ln(), sigma * sigma])
-}
-
-/// Why a person is not observed.
-#[derive(Clone, Copy, Debug)]
-enum Presence {
-    Hidden,
-    Outside,
-    Gone,
 }

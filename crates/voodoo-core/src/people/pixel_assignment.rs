@@ -3,7 +3,7 @@
 use std::ops::RangeBounds;
 
 use crate::body::Body;
-use crate::math::{Aabb, Points, Pose, Vec3, shifted};
+use crate::math::{Aabb, Points, Pose, Vec3, refill, reset, shifted};
 use crate::observation::background::{Background, Backgrounds};
 use crate::observation::candidates::{body_box, image_window};
 use crate::observation::frame::{Cloud, DepthImage, DepthPixels, Frame, Scope};
@@ -78,46 +78,53 @@ impl PixelAssignment {
         scene: &Backgrounds,
         bodies: impl Iterator<Item = PredictedBody<'a>> + Clone,
     ) {
-        self.assigned.clear();
-        self.assigned.extend(bodies.clone().map(|body| body.number));
-        self.owners.resize_with(frame.images.len(), Vec::new);
-        for (number, image) in frame.images.iter().enumerate() {
-            let mut owners = self.unassigned(number, image.pixels.len(), |assignment| &mut assignment.owners);
-            let background = scene.of_image(image).map_or(&[][..], Background::depth);
-            for PredictedBody { number, body, poses } in bodies.clone() {
-                if let Some(origin) = poses.first().map(|root| root.translation) {
-                    self.gather(image, background, origin, &body_box(body, poses, f64::from(REACH)));
-                    self.assign_nearest(number, body, poses, origin, &mut owners);
-                }
-            }
-            self.owners[number] = owners;
+        refill(&mut self.assigned, bodies.clone().map(|body| body.number));
+        let [mut owners, mut cloud_owners] = [&mut self.owners, &mut self.cloud_owners].map(std::mem::take);
+        owners.resize_with(frame.images.len(), Vec::new);
+        for (image, owners) in frame.images.iter().zip(&mut owners) {
+            let background = scene.depth(image);
+            let gather = |own: &mut Self, origin, bounds: &Aabb| own.gather(image, background, origin, bounds);
+            self.assign_all(image.pixels.len(), bodies.clone(), owners, gather);
         }
-        self.cloud_owners.resize_with(frame.clouds.len(), Vec::new);
-        for (number, cloud) in frame.clouds.iter().enumerate() {
+        cloud_owners.resize_with(frame.clouds.len(), Vec::new);
+        for (cloud, owners) in frame.clouds.iter().zip(&mut cloud_owners) {
             let free = if cloud.scope == Scope::Free { cloud.points.len() } else { 0 };
-            let mut owners = self.unassigned(number, free, |assignment| &mut assignment.cloud_owners);
-            if free == 0 {
-                self.cloud_owners[number] = owners;
-                continue;
+            let gather = |own: &mut Self, origin, bounds: &Aabb| own.gather_cloud(cloud, origin, bounds);
+            self.assign_all(free, bodies.clone(), owners, gather);
+        }
+        (self.owners, self.cloud_owners) = (owners, cloud_owners);
+    }
+
+    /// Assigns `count` pixels or points, which have no owner yet, to the body with the nearest surface; `gather` finds those in a
+    /// box.
+    fn assign_all<'a>(
+        &mut self,
+        count: usize,
+        bodies: impl Iterator<Item = PredictedBody<'a>>,
+        owners: &mut Vec<u16>,
+        gather: impl Fn(&mut Self, Vec3, &Aabb),
+    ) {
+        reset(&mut self.distances, count, REACH);
+        reset(owners, count, NO_OWNER);
+        for predicted in bodies.filter(|_| count > 0) {
+            if let Some(origin) = predicted.poses.first().map(|root| root.translation) {
+                gather(self, origin, &body_box(predicted.body, predicted.poses, f64::from(REACH)));
+                self.assign_nearest(predicted, origin, owners);
             }
-            for PredictedBody { number, body, poses } in bodies.clone() {
-                if let Some(origin) = poses.first().map(|root| root.translation) {
-                    self.gather_cloud(cloud, origin, &body_box(body, poses, f64::from(REACH)));
-                    self.assign_nearest(number, body, poses, origin, &mut owners);
-                }
-            }
-            self.cloud_owners[number] = owners;
         }
     }
 
-    /// Assigns pixels of an image, be they of the known scene or not, to the body with the nearest surface, within reach.
-    pub(super) fn assign_segment<'a>(
+    /// Assigns pixels of an image, be they of the known scene or not, to the body with the nearest surface, within reach. The bodies
+    /// are numbered from `first` on.
+    pub(super) fn assign_segment(
         &mut self,
         image: &DepthImage,
         number: usize,
         pixels: &[usize],
-        bodies: impl Iterator<Item = PredictedBody<'a>> + Clone,
+        first: usize,
+        bodies: &[(Body, Vec<Pose>)],
     ) {
+        let bodies = (first as u16..).zip(bodies).map(|(number, (body, poses))| PredictedBody { number, body, poses });
         let Some(origin) = bodies.clone().find_map(|body| body.poses.first()).map(|root| root.translation) else {
             return;
         };
@@ -127,33 +134,20 @@ impl PixelAssignment {
         for pixel in pixels {
             let z = image.pixels.get(*pixel) * image.meters_per_unit as f32;
             let point = image.world_from_sensor * image.back_project(*pixel, z);
-            self.queries.push((point - origin).to_array().map(|value| value as f32));
+            self.queries.push((point - origin).as_vec3().to_array());
             self.pixels.push((*pixel as u32, 1));
         }
         let mut owners = std::mem::take(&mut self.owners[number]);
-        self.distances.clear();
-        self.distances.resize(owners.len(), REACH);
-        for PredictedBody { number, body, poses } in bodies {
-            self.assign_nearest(number, body, poses, origin, &mut owners);
-        }
+        reset(&mut self.distances, owners.len(), REACH);
+        bodies.for_each(|body| self.assign_nearest(body, origin, &mut owners));
         self.owners[number] = owners;
     }
 
-    /// Returns `count` owners, none assigned yet, in the buffer of the previous frame.
-    fn unassigned(&mut self, number: usize, count: usize, of: impl Fn(&mut Self) -> &mut Vec<Vec<u16>>) -> Vec<u16> {
-        self.distances.clear();
-        self.distances.resize(count, REACH);
-        let mut owners = std::mem::take(&mut of(self)[number]);
-        owners.clear();
-        owners.resize(count, NO_OWNER);
-        owners
-    }
-
     /// Assigns to a body the gathered points, relative to `origin`, that no other body is nearer to.
-    fn assign_nearest(&mut self, number: u16, body: &Body, poses: &[Pose], origin: Vec3, owners: &mut [u16]) {
+    fn assign_nearest(&mut self, predicted: PredictedBody, origin: Vec3, owners: &mut [u16]) {
         let Self { distances, queries, pixels, nearest, limb, .. } = self;
-        nearest.clear();
-        nearest.resize(queries.len(), REACH);
+        let PredictedBody { number, body, poses } = predicted;
+        reset(nearest, queries.len(), REACH);
         for (own, pose) in body.limbs().iter().zip(poses) {
             own.shape.approximate_distances(&shifted(pose, origin), queries, limb);
             nearest.iter_mut().zip(limb.iter()).for_each(|(nearest, limb)| *nearest = nearest.min(*limb));
@@ -175,7 +169,7 @@ impl PixelAssignment {
         for index in 0..cloud.points.len() {
             let point = cloud.world_from_sensor * cloud.points.get(index);
             if bounds.contains(point) {
-                self.queries.push((point - origin).to_array().map(|value| value as f32));
+                self.queries.push((point - origin).as_vec3().to_array());
                 self.pixels.push((index as u32, 1));
             }
         }
@@ -222,7 +216,7 @@ impl PixelAssignment {
                 let [x, y] = image.camera.pixel_ray(column, row);
                 let point = image.world_from_sensor * (f64::from(z) * Vec3::new(x, y, 1.0));
                 if bounds.contains(point) {
-                    queries.push((point - origin).to_array().map(|value| value as f32));
+                    queries.push((point - origin).as_vec3().to_array());
                     pixels.push(((start + column) as u32, run as u32));
                 }
                 column += run;

@@ -2,7 +2,7 @@
 
 use crate::relocalize::ENOUGH_ODDS;
 
-/// Why somebody who was detected is not tracked, see [`People::refusal`].
+/// Why somebody who was detected is not tracked, see [`People::refusal`](crate::People::refusal).
 ///
 /// ```
 /// use voodoo_core::Refusal;

@@ -1,7 +1,7 @@
 //! Model of the static scene shared by all persons, learned in pixels that no person owns.
 
 use crate::observation::background::{Background, Backgrounds};
-use crate::observation::frame::{DepthImage, Frame};
+use crate::observation::frame::Frame;
 use crate::observation::observer::Own;
 use crate::observation::ownership::NO_OWNER;
 
@@ -100,7 +100,7 @@ impl SceneModel {
             let all = !std::mem::replace(&mut tentative.filled, true);
             if all {
                 for (index, owner) in owners.iter().enumerate() {
-                    let z = meters(image, index).unwrap_or(0.0);
+                    let z = image.depth(index).unwrap_or(0.0);
                     let learned = if *owner == NO_OWNER { &mut known[index] } else { &mut tentative.depth[index] };
                     *learned = z;
                 }
@@ -109,7 +109,7 @@ impl SceneModel {
                 self.learned += image.camera.width();
                 let (mut new, mut width) = (0, 0.0);
                 for index in row * image.camera.width()..(row + 1) * image.camera.width() {
-                    let seen = meters(image, index).filter(|_| owners[index] == NO_OWNER);
+                    let seen = image.depth(index).filter(|_| owners[index] == NO_OWNER);
                     match seen.filter(|z| is_new(known[index], tentative.depth[index], *z)) {
                         Some(z) => (new, width) = (new + 1, width + f64::from(z) / image.camera.focal()[0]),
                         None => (new, width) = (0, 0.0),
@@ -126,13 +126,11 @@ impl SceneModel {
 
     /// Whether most of these pixels of an image show the learned scene.
     pub(super) fn is_still(&self, frame: &Frame, image: usize, pixels: &[usize]) -> bool {
-        let Some((image, known)) = frame.images.get(image).and_then(|image| Some((image, self.known.of_image(image)?)))
-        else {
-            return false;
-        };
+        let Some(image) = frame.images.get(image) else { return false };
+        let known = self.known.depth(image);
         let still = |pixel: &&usize| {
-            let known = known.depth().get(**pixel).copied().unwrap_or(0.0);
-            meters(image, **pixel).is_some_and(|z| Background::contains(known, z))
+            let known = known.get(**pixel).copied().unwrap_or(0.0);
+            image.depth(**pixel).is_some_and(|z| Background::contains(known, z))
         };
         2 * pixels.iter().filter(still).count() > pixels.len()
     }
@@ -162,12 +160,6 @@ fn learn_pixel(known: &mut f32, tentative: &mut f32, frames: &mut u8, z: f32) {
     if *frames >= STILL_FRAMES[usize::from(*known > 0.0)] {
         (*known, *frames) = (z, 0);
     }
-}
-
-/// Returns the depth of a pixel, meters, if it has a return.
-fn meters(image: &DepthImage, index: usize) -> Option<f32> {
-    let z = image.pixels.get(index) * image.meters_per_unit as f32;
-    (z > 0.0 && z.is_finite()).then_some(z)
 }
 
 #[cfg(test)]
@@ -223,8 +215,7 @@ mod tests {
             (0..3).for_each(|frame| feed(&mut scene, 5000, frame, |_, _| ()));
             feed(&mut scene, came, 3, |scene, frame| {
                 scene.release(frame, 0, &[7]);
-                let known = scene.known().of_image(&frame.images[0]).map(|known| [known.depth()[7], known.depth()[8]]);
-                assert_eq!(known, Some([left, 5.0]));
+                assert_eq!(scene.known().depth(&frame.images[0])[7..9], [left, 5.0]);
             });
         }
     }

@@ -28,7 +28,8 @@ pub(super) struct TentativeTrack {
     pub(super) positions: Vec<PositionRelation>,
     /// Whether a detection of the frame with this stamp came with it.
     given: bool,
-    sum: f64,
+    /// Sum of the log odds of its detections that it is a person, at least 0.
+    pub(super) log_odds: f64,
     stamp: f64,
 }
 
@@ -36,18 +37,13 @@ impl TentativeTrack {
     /// Returns the track of a person who was detected for the first time, in the image with this number.
     pub(super) fn in_image(stamp: f64, placed: PlacedDetection, image: usize) -> Self {
         let PlacedDetection { root: place, detection, .. } = placed;
-        Self { place, sum: detection.person, detection, image, positions: Vec::new(), given: false, stamp }
+        Self { place, log_odds: detection.person, detection, image, positions: Vec::new(), given: false, stamp }
     }
 
     /// Returns the track of a person at this position who came with the frame.
     pub(super) fn given(stamp: f64, place: Vec3, person: &DetectedPerson) -> Self {
         let (detection, positions) = (Detection::default(), person.positions.to_vec());
-        Self { place, sum: person.person, detection, image: 0, positions, given: true, stamp }
-    }
-
-    /// Sum of the log odds of its detections that it is a person, at least 0.
-    pub(super) fn log_odds(&self) -> f64 {
-        self.sum
+        Self { place, log_odds: person.person, detection, image: 0, positions, given: true, stamp }
     }
 
     /// Median standard deviation of the joints that are measured or visible, meters; infinite without any.
@@ -74,21 +70,21 @@ impl TentativeTracks {
 
     /// Updates with a detection, from whose log odds `static_odds` are subtracted if the object has been there from the start.
     pub(super) fn update(&mut self, mut found: TentativeTrack, static_odds: Option<f64>) {
-        found.sum -= static_odds.unwrap_or(DETECTION_COST);
+        found.log_odds -= static_odds.unwrap_or(DETECTION_COST);
         let near = |track: &mut TentativeTrack| track.place.distance(found.place) < SAME_PERSON;
         let mut before = self.tracks.extract_if(.., near).fold(None, |first, track| first.or(Some(track)));
         if let Some(mut first) = before.take_if(|before| before.stamp == found.stamp) {
             // Of one frame the most confident detection in an image counts, which comes first. With one that came with the frame,
             // the surer one tells that it is a person, and the more precise one where.
             if first.given {
-                let sum = first.sum.max(found.sum);
+                let sum = first.log_odds.max(found.log_odds);
                 first = if found.sigma() < first.sigma() { found } else { first };
-                (first.sum, first.given) = (sum, true);
+                (first.log_odds, first.given) = (sum, true);
             }
             self.tracks.push(first);
             return;
         }
-        found.sum = (before.map_or(0.0, |before| before.sum) + found.sum).max(0.0);
+        found.log_odds = (before.map_or(0.0, |before| before.log_odds) + found.log_odds).max(0.0);
         self.tracks.push(found);
     }
 
@@ -99,7 +95,7 @@ impl TentativeTracks {
 
     /// Returns the greatest sum of log odds of those that were detected in the frame with this stamp.
     pub(super) fn greatest_at(&self, stamp: f64) -> Option<f64> {
-        self.updated_at(stamp).map(TentativeTrack::log_odds).max_by(f64::total_cmp)
+        self.updated_at(stamp).map(|track| track.log_odds).max_by(f64::total_cmp)
     }
 
     /// Deletes the tracks that coincide with one of `others`.
@@ -111,7 +107,7 @@ impl TentativeTracks {
     /// Removes and returns the tracks that were detected in the frame with this stamp and are confirmed: those that came with the
     /// frame first, then those who fill most of the image.
     pub(super) fn take_confirmed(&mut self, stamp: f64) -> Vec<TentativeTrack> {
-        let sure = |track: &mut TentativeTrack| track.stamp == stamp && track.sum >= ENOUGH_ODDS;
+        let sure = |track: &mut TentativeTrack| track.stamp == stamp && track.log_odds >= ENOUGH_ODDS;
         let mut confirmed: Vec<TentativeTrack> = self.tracks.extract_if(.., sure).collect();
         confirmed.sort_by_key(|track| (!track.given, Reverse(track.detection.pixels.len())));
         confirmed
@@ -137,7 +133,7 @@ mod tests {
         tracks.update(TentativeTrack::in_image(0.0, placed, 0), Some(0.0));
         let confirmed = tracks.take_confirmed(0.0);
         assert_eq!(confirmed.len(), 1);
-        (!confirmed[0].positions.is_empty(), confirmed[0].sum)
+        (!confirmed[0].positions.is_empty(), confirmed[0].log_odds)
     }
 
     #[test]

@@ -68,10 +68,9 @@ impl EmptyScene {
     pub(super) fn check(&self, picture: &ColorImage, index: usize) -> Result<(), TrackError> {
         let [height, width] = [picture.camera.height(), picture.camera.width()];
         let valid = self.size == [height, width] && self.kind == Kind::new(&picture.pixels);
-        let (what, expected) = (|| format!("color[{index}].image"), "a picture like those of the empty scene");
-        TrackError::unless(valid, what, expected, || {
-            format!("{width}x{height} beside {}x{}", self.size[1], self.size[0])
-        })
+        let (what, expected) = (format_args!("color[{index}].image"), "a picture like those of the empty scene");
+        let found = format_args!("{width}x{height} beside {}x{}", self.size[1], self.size[0]);
+        TrackError::unless(valid, what, expected, found)
     }
 
     /// Log-likelihood of this color at a pixel that does not show the body; `around` is the log-likelihood under the colors of

@@ -1,6 +1,6 @@
 //! Smoothed color histograms: 16 x 16 x 16 bins for color images, 256 for grayscale.
 
-use crate::math::{reset, vectorized};
+use crate::math::{refill, reset, vectorized};
 use crate::observation::picture::ColorPixels;
 
 /// Leading bits of each channel that select its bin.
@@ -126,8 +126,7 @@ fn smooth_color(values: &mut [f32], room: &mut Vec<f32>) {
 /// Spreads values to their neighbors at a stride, within rows of the given length; values at the ends keep what would leave the
 /// row.
 fn smooth(values: &mut [f32], room: &mut Vec<f32>, stride: usize, row: usize) {
-    room.clear();
-    room.extend_from_slice(values);
+    refill(room, values.iter().copied());
     let length = stride * row;
     vectorized!({
         for (values, before) in values.chunks_exact_mut(length).zip(room.chunks_exact(length)) {

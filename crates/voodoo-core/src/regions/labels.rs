@@ -173,11 +173,8 @@ impl LimbLabels {
             }
             let whole = [&range, &(row..row + 1)];
             for (drawn, new) in drawn.iter_mut().zip(whole) {
-                *drawn = if drawn.start >= drawn.end {
-                    new.clone()
-                } else {
-                    drawn.start.min(new.start)..drawn.end.max(new.end)
-                };
+                let both = drawn.start.min(new.start)..drawn.end.max(new.end);
+                *drawn = if Range::is_empty(drawn) { new.clone() } else { both };
             }
             let (y, x) = (row as f32, range.start as f32);
             let start = (x - start[0]) * along[0] + (y - start[1]) * along[1];

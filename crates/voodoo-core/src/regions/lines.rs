@@ -61,7 +61,7 @@ impl<'a> OcclusionDepth<'a> {
         let near = |pose: &Pose| pose.translation.distance(place) < SAME_VIEW;
         let image = frame.images.iter().find(|image| near(&image.world_from_sensor))?;
         let working_from_camera = image.world_from_sensor;
-        let view = DepthView { image, background: None, working_from_camera, segmented: false };
+        let view = DepthView { image, background: &[], working_from_camera, segmented: false };
         Some(Self { view, depth_from_camera: working_from_camera.inverse() * picture.world_from_sensor })
     }
 

@@ -18,7 +18,6 @@ mod segment;
 
 use crate::association::correspondence::{Correspondences, RegionPair};
 use crate::body::Body;
-use crate::camera::Camera;
 use crate::error::TrackError;
 use crate::math::{Pose, Vec3, refill, reset, shifted};
 use crate::observation::frame::Frame;
@@ -161,9 +160,9 @@ impl ColorRegions {
     /// Returns an error for images with distortion, and for those that cannot be compared with the empty scene.
     pub(crate) fn check(&self, frame: &Frame) -> Result<(), TrackError> {
         for (index, picture) in frame.colors.iter().enumerate() {
-            let (what, found) = (|| format!("color[{index}].camera"), || format!("{:?}", picture.camera.lens()));
             let expected = "a pinhole camera: take the distortion out of the picture";
-            TrackError::unless(!picture.camera.distorts(), what, expected, found)?;
+            let (what, lens) = (format_args!("color[{index}].camera"), picture.camera.lens());
+            TrackError::unless(!picture.camera.distorts(), what, expected, format_args!("{lens:?}"))?;
             let known = self.cameras.iter().find(|camera| camera.number == picture.number);
             known.and_then(|camera| camera.scene.as_ref()).map_or(Ok(()), |scene| scene.check(picture, index))?;
         }
@@ -235,17 +234,17 @@ impl ColorRegions {
             edges.reserve(lines.capacity());
             pairs.reserve(lines.capacity());
             for line in lines {
-                let searched = is_requested.is_none_or(|is_requested| is_requested(usize::from(line.limb)));
+                let limb = usize::from(line.limb);
+                let searched = is_requested.is_none_or(|is_requested| is_requested(limb));
                 let found = if searched { scan::edge_on(&view, line, search, together) } else { None };
                 edges.push(found);
                 if together {
-                    let length = posed.body.limbs()[usize::from(line.limb)].shape.length();
-                    evidence[usize::from(line.limb)].take(line.foot.z / length, found.map(|found| found.beside));
+                    let length = posed.body.limbs()[limb].shape.length();
+                    evidence[limb].take(line.foot.z / length, found.map(|found| found.beside));
                 }
                 let Some(edge) = found.map(|found| found.edge).filter(|edge| edge.information > 0.0) else { continue };
                 let motion = line.motion / f64::from(unit);
                 let slope = motion.length();
-                let limb = usize::from(line.limb);
                 pairs.push(RegionPair {
                     limb,
                     x: posed.poses[limb] * line.foot,
@@ -298,7 +297,8 @@ impl ColorRegions {
         let camera_from_limb = self.camera_from_limb(frame, picture, posed);
         let camera = self.camera(picture.number);
         refill(&mut camera.camera_from_limb, (0..posed.poses.len()).map(camera_from_limb));
-        camera.unit = unit_of(picture.camera);
+        let [fx, fy] = picture.camera.focal();
+        camera.unit = (0.5 * (fx + fy) / FOCAL) as f32;
         let (body, Learned { unit, labels, lines, camera_from_limb, .. }) = (posed.body, camera);
         labels.draw(body, camera_from_limb, picture.camera, CELL_BITS, |_| true);
         lines.clear();
@@ -335,10 +335,4 @@ impl Learned {
     fn view<'a>(&'a self, picture: &'a ColorImage, labels: &'a LimbLabels, groups: &'a [u16]) -> ScanView<'a> {
         ScanView { picture, model: &self.model, labels, scene: self.scene.as_ref(), groups, unit: self.unit }
     }
-}
-
-/// Pixels per unit.
-fn unit_of(camera: &Camera) -> f32 {
-    let [fx, fy] = camera.focal();
-    (0.5 * (fx + fy) / FOCAL) as f32
 }

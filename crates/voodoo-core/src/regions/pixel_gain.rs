@@ -3,7 +3,7 @@
 //! When both legs are fitted to the contour of one leg, both match its colors. What a limb explains in addition to the other
 //! limbs distinguishes this case.
 
-use super::histogram::bin_of;
+use super::histogram::{MOST_RATIO, bin_of};
 use super::labels::{LimbLabels, NOTHING};
 use super::lines::NEARER_BY;
 use super::{ColorRegions, Posed};
@@ -96,7 +96,8 @@ impl ColorRegions {
                 if let Some(other) = behind(labels.at(column, row), depth) {
                     let pixel = row * width + column;
                     let bin = bin_of(&picture.pixels, pixel);
-                    gain.gained += area * f64::from(view.certainty(group, other, pixel, bin));
+                    // The log ratio as a fraction of its bound.
+                    gain.gained += area * f64::from(view.ratio(group, other, pixel, bin) / MOST_RATIO);
                 }
             });
         }
@@ -123,6 +124,23 @@ impl ColorRegions {
             }
         }
         self.backdrop = backdrop;
+    }
+
+    /// The limbs' poses in a camera's frame at the time of its image.
+    pub(super) fn camera_from_limb<'a>(
+        &self,
+        frame: &Frame,
+        picture: &ColorImage,
+        Posed { poses, previous, origin, .. }: Posed<'a>,
+    ) -> impl Fn(usize) -> Pose + use<'a> {
+        // Time from the frame to the image, as a fraction of the interval of the last motion.
+        let passed = self.stamp.map_or(f64::INFINITY, |stamp| frame.stamp - stamp);
+        let fraction = (picture.stamp - frame.stamp) / passed;
+        let camera_from_working = shifted(&picture.world_from_sensor, origin).inverse();
+        move |limb| {
+            let (now, before) = (&poses[limb], previous.get(limb).filter(|_| fraction != 0.0));
+            camera_from_working * before.map_or(*now, |before| extrapolated(before, now, fraction))
+        }
     }
 }
 
@@ -155,25 +173,6 @@ fn places(
         for across in OVER {
             let off = across * radius * meter;
             each([u + off * aside[0], v + off * aside[1]], center.z - radius, patch);
-        }
-    }
-}
-
-impl ColorRegions {
-    /// The limbs' poses in a camera's frame at the time of its image.
-    pub(super) fn camera_from_limb<'a>(
-        &self,
-        frame: &Frame,
-        picture: &ColorImage,
-        Posed { poses, previous, origin, .. }: Posed<'a>,
-    ) -> impl Fn(usize) -> Pose + use<'a> {
-        // Time from the frame to the image, as a fraction of the interval of the last motion.
-        let passed = self.stamp.map_or(f64::INFINITY, |stamp| frame.stamp - stamp);
-        let fraction = (picture.stamp - frame.stamp) / passed;
-        let camera_from_working = shifted(&picture.world_from_sensor, origin).inverse();
-        move |limb| {
-            let (now, before) = (&poses[limb], previous.get(limb).filter(|_| fraction != 0.0));
-            camera_from_working * before.map_or(*now, |before| extrapolated(before, now, fraction))
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Samples images along lines: log ratios of limb and surroundings, and colors to learn.
 
 use super::empty_scene::EmptyScene;
-use super::histogram::{MOST_RATIO, bin_of, clamped, color_bin};
+use super::histogram::{bin_of, clamped, color_bin};
 use super::labels::{LimbLabels, NOTHING};
 use super::lines::{BESIDE, Line, NEARER_BY};
 use super::models::ColorModel;
@@ -190,11 +190,6 @@ impl ScanView<'_> {
             return 0.0;
         }
         clamped(own - self.model.limbs[other].log[bin])
-    }
-
-    /// The log ratio as a fraction of its bound.
-    pub(super) fn certainty(&self, group: usize, other: u16, pixel: usize, bin: usize) -> f32 {
-        self.ratio(group, other, pixel, bin) / MOST_RATIO
     }
 
     /// What would be visible at `r` units outward without the limb; `None` where something occludes it.

@@ -41,12 +41,12 @@ impl ColorRegions {
         let Some(camera) = self.cameras.iter().find(|camera| camera.number == picture.number) else { return likely };
         let view = camera.view(picture, &camera.labels, &self.groups);
         let cell = 1_usize << super::CELL_BITS;
-        let (nearest, outside) = distances(&camera.labels, [width, height], cell as f32 / camera.unit);
-        let place = |index: usize| index / width / cell * width.div_ceil(cell) + index % width / cell;
+        let cells = distances(&camera.labels, [width, height], cell as f32 / camera.unit);
+        let nearest = |index: usize| cells[index / width / cell * width.div_ceil(cell) + index % width / cell];
         // Log ratios, and then their means along rows and columns.
         let mut ratios = vec![0.0_f32; likely.len()];
         for (index, ratio) in ratios.iter_mut().enumerate() {
-            let limb = nearest[place(index)];
+            let (_, limb) = nearest(index);
             if limb == NOTHING {
                 continue;
             }
@@ -57,9 +57,9 @@ impl ColorRegions {
         }
         let around = means(&means(&ratios, width, 1), width, width);
         for (index, likely) in likely.iter_mut().enumerate() {
-            let place = place(index);
-            if nearest[place] != NOTHING && outside[place] < FARTHEST {
-                let odds = ratios[index] + around[index] - outside[place] / FALL;
+            let (outside, limb) = nearest(index);
+            if limb != NOTHING && outside < FARTHEST {
+                let odds = ratios[index] + around[index] - outside / FALL;
                 *likely = 1.0 / (1.0 + (-odds).exp());
             }
         }
@@ -84,55 +84,49 @@ fn means(values: &[f32], width: usize, stride: usize) -> Vec<f32> {
     (0..values.len()).map(mean).collect()
 }
 
-/// Of every cell the nearest limb, and the signed distance outside of the contour of what is drawn; a cell is `side` units wide.
-fn distances(labels: &super::LimbLabels, size: [usize; 2], side: f32) -> (Vec<u16>, Vec<f32>) {
+/// Of every cell the signed distance outside of the contour of what is drawn, and the nearest limb; a cell is `side` units wide.
+fn distances(labels: &super::LimbLabels, size: [usize; 2], side: f32) -> Vec<(f32, u16)> {
     let cell = 1_usize << super::CELL_BITS;
     let [columns, rows] = size.map(|size| size.div_ceil(cell));
     let visible = |index: usize| labels.at(index % columns * cell, index / columns * cell).0;
-    let mut limb: Vec<u16> = (0..columns * rows).map(visible).collect();
-    let far = |inside: bool| move |limb: &u16| if (*limb == NOTHING) == inside { 0.0 } else { f32::INFINITY };
-    let mut outward: Vec<f32> = limb.iter().map(far(false)).collect();
-    let mut inward: Vec<f32> = limb.iter().map(far(true)).collect();
-    spread(&mut outward, Some(&mut limb), columns);
-    spread(&mut inward, None, columns);
-    let outside = outward.iter().zip(&inward).map(|(outward, inward)| side * (outward - inward)).collect();
-    (limb, outside)
+    let spread_from = |is_start: fn(u16) -> bool| {
+        let start = |limb: u16| (if is_start(limb) { 0.0 } else { f32::INFINITY }, limb);
+        let mut cells: Vec<(f32, u16)> = (0..columns * rows).map(visible).map(start).collect();
+        spread(&mut cells, columns);
+        cells
+    };
+    let (outward, inward) = (spread_from(|limb| limb != NOTHING), spread_from(|limb| limb == NOTHING));
+    let both = outward.into_iter().zip(inward);
+    both.map(|((outward, limb), (inward, _))| (side * (outward - inward), limb)).collect()
 }
 
-/// Distances to the nearest cell with distance zero, in two passes; each cell takes over the limb of its nearest one.
-fn spread(distance: &mut [f32], mut limb: Option<&mut Vec<u16>>, columns: usize) {
-    let rows = distance.len() / columns.max(1);
+/// Distances to the nearest cell with distance zero, in two passes, the second one backwards; each cell takes over the limb of its
+/// nearest one.
+fn spread(cells: &mut [(f32, u16)], columns: usize) {
     let [side, corner] = CHAMFER;
-    let mut take = |to: usize, from: usize, step: f32| {
-        if distance[from] + step < distance[to] {
-            distance[to] = distance[from] + step;
-            if let Some(limb) = &mut limb {
-                limb[to] = limb[from];
+    for _ in 0..2 {
+        for to in 0..cells.len() {
+            let mut take = |from: usize, step: f32| {
+                let (distance, limb) = cells[from];
+                if distance + step < cells[to].0 {
+                    cells[to] = (distance + step, limb);
+                }
+            };
+            let (left, right, above) = (to % columns > 0, to % columns + 1 < columns, to >= columns);
+            if left {
+                take(to - 1, side);
+            }
+            if above {
+                take(to - columns, side);
+            }
+            if above && left {
+                take(to - columns - 1, corner);
+            }
+            if above && right {
+                take(to - columns + 1, corner);
             }
         }
-    };
-    for pass in 0..2 {
-        for index in 0..rows * columns {
-            let to = if pass == 0 { index } else { rows * columns - 1 - index };
-            let (column, row) = (to % columns, to / columns);
-            let (back, ahead) =
-                if pass == 0 { (column > 0, column + 1 < columns) } else { (column + 1 < columns, column > 0) };
-            let before = if pass == 0 { row > 0 } else { row + 1 < rows };
-            // The second pass runs the same way backwards.
-            let at = |offset: usize| if pass == 0 { to - offset } else { to + offset };
-            if back {
-                take(to, at(1), side);
-            }
-            if before {
-                take(to, at(columns), side);
-            }
-            if before && back {
-                take(to, at(columns + 1), corner);
-            }
-            if before && ahead {
-                take(to, at(columns - 1), corner);
-            }
-        }
+        cells.reverse();
     }
 }
 
@@ -143,15 +137,14 @@ mod tests {
     #[test]
     fn distances_spread_from_where_they_are_none() {
         let (columns, rows) = (9, 7);
-        let mut distance = vec![f32::INFINITY; columns * rows];
-        let mut limb = vec![NOTHING; columns * rows];
-        (distance[3 * columns + 4], limb[3 * columns + 4]) = (0.0, 5);
-        spread(&mut distance, Some(&mut limb), columns);
-        for (index, found) in distance.iter().enumerate() {
+        let mut cells = vec![(f32::INFINITY, NOTHING); columns * rows];
+        cells[3 * columns + 4] = (0.0, 5);
+        spread(&mut cells, columns);
+        for (index, (found, limb)) in cells.into_iter().enumerate() {
             let (x, y) = ((index % columns) as f32 - 4.0, (index / columns) as f32 - 3.0);
             assert!((found - x.hypot(y)).abs() < 0.09 * x.hypot(y) + 1e-3, "{x} {y}: {found}");
+            assert_eq!(limb, 5);
         }
-        assert!(limb.iter().all(|limb| *limb == 5));
     }
 
     #[test]

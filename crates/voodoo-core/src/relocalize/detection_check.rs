@@ -84,7 +84,7 @@ fn joint_distance(detected: Detected, body: &Body, poses: &[Pose], origin: Vec3,
 #[derive(Debug, Default)]
 pub(super) struct DetectionCheck {
     /// The track was auto-initialized by the detector.
-    auto_initialized: bool,
+    pub(super) auto_initialized: bool,
     /// Stamp of the start, seconds.
     since: Option<f64>,
     /// Stamp of the last detection that counted, seconds.
@@ -92,46 +92,16 @@ pub(super) struct DetectionCheck {
     /// Whether the detection of this frame counts against the track's being a person: those of following frames are alike.
     counts: bool,
     /// Whether a detection agreed with the track.
-    confirmed: bool,
+    pub(super) confirmed: bool,
     /// Log odds that the person is elsewhere, and that the tracked object is not a person.
-    elsewhere: f64,
+    pub(super) elsewhere: f64,
     false_track: f64,
 }
 
 impl DetectionCheck {
-    /// Resets the check for a new track.
-    pub(super) fn restart(&mut self) {
-        *self = Self::default();
-    }
-
-    /// Whether the track was auto-initialized by the detector.
-    pub(super) fn set_auto_initialized(&mut self, auto_initialized: bool) {
-        self.auto_initialized = auto_initialized;
-    }
-
-    /// Whether the track was auto-initialized by the detector.
-    pub(super) fn is_auto_initialized(&self) -> bool {
-        self.auto_initialized
-    }
-
     /// Whether the track was started less than a second ago.
     pub(super) fn is_new(&self, stamp: f64) -> bool {
         self.since.is_none_or(|since| stamp - since < NEW_TRACK_AGE)
-    }
-
-    /// Whether a detection or a second of tracking confirmed the track.
-    pub(super) fn is_confirmed(&self, stamp: f64) -> bool {
-        self.is_detected() || !self.is_new(stamp)
-    }
-
-    /// Whether a detection confirmed the track.
-    pub(super) fn is_detected(&self) -> bool {
-        self.auto_initialized || self.confirmed
-    }
-
-    /// Notes that the track is right.
-    pub(super) fn confirm(&mut self) {
-        self.confirmed = true;
     }
 
     /// Counts a frame and returns whether the detector is due for a person beside so many others.
@@ -171,11 +141,6 @@ impl DetectionCheck {
             self.false_track = (self.false_track - person.clamp(-ENOUGH_ODDS, ENOUGH_ODDS)).max(0.0);
         }
         self.false_track >= FALSE_TRACK_ODDS
-    }
-
-    /// Resets the evidence after the detected position was tried.
-    pub(super) fn reset_elsewhere(&mut self) {
-        self.elsewhere = 0.0;
     }
 }
 

@@ -4,121 +4,91 @@
 //! all terms, and is not itself lost.
 
 mod detection_check;
-mod loss_monitor;
 mod person_detector;
 mod segment_search;
 mod trials;
 
 use crate::association::correspondence::Correspondences;
 use crate::body::{Body, Model};
-use crate::detect::{
-    Detect, DetectError, Detected, DetectionQuery, JointMap, PlacedDetection, fit_body, fit_pose, is_sized_like,
-};
+use crate::detect::{BoundDetector, Detected, PlacedDetection, fit_body, fit_pose, is_sized_like};
 use crate::fit::{Context, Fit, UNKNOWN_MOTION};
 use crate::math::{Aabb, Pose, Vec3, shifted};
 use crate::observation::candidates::{Candidates, body_box};
-use crate::observation::frame::{Frame, Ground};
-use crate::observation::observer::Own;
-use crate::observation::ownership::OwnershipMask;
+use crate::observation::frame::Ground;
 use detection_check::{DetectionCheck, SIGMAS};
 pub(crate) use detection_check::{DetectionVerdict, Reasons};
 pub(crate) use detection_check::{ENOUGH_ODDS, distance_cost, trunk_is_elsewhere};
-pub(crate) use loss_monitor::FrameOutcome;
-use loss_monitor::LossMonitor;
-use person_detector::PersonDetector;
 use segment_search::SegmentSearch;
 use trials::Trials;
 
 /// Number of consecutive frames after which a lost body counts as lost.
 const PATIENCE: usize = 2;
 
+/// Outcome of a frame for the body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct FrameOutcome {
+    /// The body is lost.
+    pub lost: bool,
+    /// The body is tracked, neither lost nor degraded.
+    pub tracked: bool,
+    /// Known depth cameras gave no image, so the frame is no evidence that the body left.
+    pub silent: bool,
+}
+
 /// Finds bodies. Stores the evidence of past detections and for how long the body has been lost.
 #[derive(Debug, Default)]
 pub(crate) struct Relocalizer {
-    loss: LossMonitor,
+    detector: BoundDetector,
+    detection: Option<PlacedDetection>,
+    /// Number of the image with the detection.
+    image: usize,
+    /// Log odds that the object at the queried position is a person; the largest over all images.
+    person_odds: Option<f64>,
+    /// The floor on which the body stood when it was found, world frame.
+    floor: Option<Ground>,
+    check: DetectionCheck,
+    /// Number of consecutive frames in which the body was lost.
+    lost: usize,
     candidates: Candidates,
     matched: Correspondences,
     trials: Trials,
     search: SegmentSearch,
-    people: PersonDetector,
-    check: DetectionCheck,
 }
 
 impl Relocalizer {
-    /// Sets the detector that finds this body, or removes it.
-    pub(crate) fn set_detector(&mut self, detector: Option<Box<dyn Detect>>, body: &Body) {
-        self.people.set_detector(detector, body);
-    }
-
-    /// Rebinds the detector after the body's limbs or sites have changed.
-    pub(crate) fn bind(&mut self, body: &Body) {
-        self.people.bind(body);
-    }
-
-    /// Returns the map from the detector's joints to the body.
-    pub(crate) fn map(&self) -> &JointMap {
-        self.people.map()
-    }
-
-    /// The error of the detector, if it failed since [`Self::clear_error`].
-    pub(crate) fn error(&self) -> Option<&DetectError> {
-        self.people.error()
-    }
-
-    /// Clears the detector's last error.
-    pub(crate) fn clear_error(&mut self) {
-        self.people.clear_error();
-    }
-
     /// Clears everything that belongs to an earlier track.
     pub(crate) fn restart(&mut self, model: &Model, poses: &[Pose]) {
-        self.loss.restart();
-        self.check.restart();
-        self.people.bind(&model.body);
-        self.people.keep_floor(false);
+        self.lost = 0;
+        self.check = DetectionCheck::default();
+        self.bind(&model.body);
+        self.floor = None;
         self.search.remember(poses);
-    }
-
-    /// Whether the body can be found without a pose.
-    pub(crate) fn can_detect(&self) -> bool {
-        self.people.detects()
-    }
-
-    /// Takes this detection for the one of this frame.
-    pub(crate) fn set_detection(&mut self, detection: PlacedDetection) {
-        self.people.set_detection(detection);
-    }
-
-    /// Records how the track was started: `auto_initialized` by the detector, or by the user.
-    pub(crate) fn record_start(&mut self, auto_initialized: bool) {
-        self.check.set_auto_initialized(auto_initialized);
-        self.people.keep_floor(auto_initialized);
     }
 
     /// Returns the floor that the detector found under an auto-initialized body, world frame. It is used where the ground plane
     /// is not given.
     pub(crate) fn floor(&self) -> Option<Ground> {
-        self.people.floor
+        self.floor
     }
 
     /// Whether the track was auto-initialized by the detector.
     pub(crate) fn is_auto_initialized(&self) -> bool {
-        self.check.is_auto_initialized()
+        self.check.auto_initialized
     }
 
     /// Whether a detection or a second of tracking confirmed the track.
     pub(crate) fn is_confirmed(&self, stamp: f64) -> bool {
-        self.check.is_confirmed(stamp)
+        self.is_detected() || !self.is_new(stamp)
     }
 
     /// Notes that a detection elsewhere is somebody else.
     pub(crate) fn confirm(&mut self) {
-        self.check.confirm();
+        self.check.confirmed = true;
     }
 
     /// Whether a detection confirmed the track.
     pub(crate) fn is_detected(&self) -> bool {
-        self.check.is_detected()
+        self.check.auto_initialized || self.check.confirmed
     }
 
     /// Whether the track was started less than a second ago.
@@ -128,91 +98,47 @@ impl Relocalizer {
 
     /// Whether the detection of this frame may be of a body of these sizes.
     pub(crate) fn detects_sizes_of(&self, body: &Body) -> bool {
-        self.people.detection().is_none_or(|detected| is_sized_like(body, detected, SIGMAS))
+        self.detected().is_none_or(|detected| is_sized_like(body, detected, SIGMAS))
     }
 
     /// Returns the body and its poses, world frame, that fit best the detection of this frame. The body is `set`, the one that is
     /// known, or has the detected sizes where none is or these clearly differ.
     pub(crate) fn fit_detected(&self, model: &Model, set: Option<&Body>) -> Option<(Body, Vec<Pose>)> {
-        let detected = self.people.detection()?;
+        let detected = self.detected()?;
         match set.filter(|set| is_sized_like(set, detected, SIGMAS)) {
             Some(set) => Some((set.clone(), fit_pose(set, detected)?)),
             None => fit_body(model, detected),
         }
     }
 
-    /// Runs the detector on the owned part of a frame where that is due. `root` is the expected position of the body, world frame.
-    pub(crate) fn detect(
-        &mut self,
-        body: &Body,
-        frame: &Frame,
-        ownership: OwnershipMask,
-        root: Vec3,
-        reasons: Reasons,
-    ) {
-        if self.check.is_due(frame.stamp, reasons, ownership.others) && self.people.detects() {
-            let query = if reasons.anywhere { DetectionQuery::Any } else { DetectionQuery::Near(root) };
-            self.people.detect(body, frame, ownership, query);
-        } else {
-            self.people.forget();
-        }
-    }
-
-    /// Drops the detection of this frame if it is too far from a position, world frame, to be of a person who was tracked `elapsed`
-    /// seconds before.
-    pub(crate) fn forget_somebody_else(&mut self, root: Vec3, elapsed: f64) {
-        self.people.forget_somebody_else(root, elapsed);
-    }
-
-    /// Drops the detection of this frame.
-    pub(crate) fn forget(&mut self) {
-        self.people.forget();
-    }
-
-    /// Returns the detection of this frame, if there is one.
-    pub(crate) fn detected(&self) -> Option<Detected<'_>> {
-        self.people.detection()
-    }
-
-    /// Returns the pixels of the detection.
-    pub(crate) fn own_pixels(&self) -> Own<'_> {
-        self.people.own_pixels()
-    }
-
     /// Compares the detection of this frame with a body at these poses, working frame, whose origin is at `origin` in the world.
     pub(crate) fn compare(&mut self, body: &Body, poses: &[Pose], origin: Vec3) -> Option<DetectionVerdict> {
-        let detected = self.people.detection()?;
-        Some(self.check.compare(detected, body, poses, origin))
+        let Self { detector, detection, check, .. } = self;
+        let detected = Detected { detection: &detection.as_ref()?.detection, map: detector.map() };
+        Some(check.compare(detected, body, poses, origin))
     }
 
     /// Whether the track is not a person, by the detections up to this frame.
     pub(crate) fn is_false_track(&mut self) -> bool {
-        self.check.is_false_track(self.people.person_odds())
+        self.check.is_false_track(self.person_odds)
     }
 
     /// Returns whether the detected poses of this frame, refined, explain the frame better than the present ones; working frame.
     /// The matches of `fit` are restored before it returns.
     pub(crate) fn try_detected(&mut self, context: Context, fit: &mut Fit, present: &[Pose], lost: bool) -> bool {
-        let Some(detected) = self.people.detection() else { return false };
+        let Some(detected) = self.detected() else { return false };
         let origin = context.observation.origin();
         let Some(mut place) = fit_pose(&context.model.body, detected) else { return false };
         place.iter_mut().for_each(|pose| *pose = shifted(pose, origin));
-        let (low, high) = (detected.detection.low - origin, detected.detection.high - origin);
         let margin = context.config.body_box_margin;
-        let there = Aabb::new(low - Vec3::splat(margin), high + Vec3::splat(margin));
+        let there = Aabb::new(detected.detection.low - origin, detected.detection.high - origin).enlarged(margin);
         // Points that the present pose explains must not be left unexplained, unless the body is `lost` there.
         let here = if lost { there } else { body_box(&context.model.body, present, margin) };
-        let bounds = Aabb::new(there.mins.min(here.mins), there.maxs.max(here.maxs));
+        let bounds = there.union(here);
         // The detection is tried now, so another trial needs new evidence.
-        self.check.reset_elsewhere();
+        self.check.elsewhere = 0.0;
         fit.swap_matches(&mut self.matched);
-        self.candidates.gather(
-            context.observation.frame(),
-            origin,
-            &bounds,
-            context.observation.views.backgrounds,
-            context.config,
-        );
+        self.candidates.gather(context.observation.views, &bounds, context.config);
         let observation = context.observation.with(&self.candidates);
         // Before its first frame the body is where it was set, and what is beside it may be scene.
         let first = context.previous.is_empty();
@@ -228,19 +154,24 @@ impl Relocalizer {
 
     /// The poses that a detection or the search found last, working frame.
     pub(crate) fn found(&self) -> &[Pose] {
-        self.trials.poses()
+        &self.trials.poses
     }
 
     /// Returns for how many frames the lost body has been searched: the count starts at the frame from which on a loss is not
     /// just a blurred image. `None` if the body is not searched for.
     pub(crate) fn frames_searched(&self) -> Option<usize> {
-        self.loss.frames_searched()
+        self.lost.checked_sub(PATIENCE)
     }
 
     /// Updates with the outcome of a frame for the body at these poses.
     pub(crate) fn observe(&mut self, outcome: FrameOutcome, poses: &[Pose]) {
-        self.loss.observe(outcome);
-        if outcome.tracked {
+        let FrameOutcome { lost, tracked, silent } = outcome;
+        if lost {
+            self.lost += usize::from(!silent);
+        } else if tracked || self.frames_searched().is_none() {
+            self.lost = 0;
+        }
+        if tracked {
             self.search.remember(poses);
         }
     }
@@ -248,27 +179,22 @@ impl Relocalizer {
     /// Searches for a lost body that the detector cannot find. Returns whether it explains the frame better there than at
     /// `present`. The matches of `fit` are restored before it returns.
     pub(crate) fn search(&mut self, context: Context, fit: &mut Fit, present: &[Pose]) -> bool {
-        let (frame, origin) = (context.observation.frame(), context.observation.origin());
-        if self.frames_searched().is_none() || self.people.detects() && !frame.images.is_empty() {
+        let views = context.observation.views;
+        if self.frames_searched().is_none() || self.can_detect() && !views.frame.images.is_empty() {
             return false;
         }
-        let backgrounds = context.observation.views.backgrounds;
-        self.search.segments.find(frame, origin, backgrounds, context.config);
+        self.search.segments.find(views, context.config);
         fit.swap_matches(&mut self.matched);
-        let mut found = false;
-        let mut index = 0;
-        while let Some(segment) = self.search.segment(index).filter(|_| !found) {
-            index += 1;
-            if !self.search.is_body_sized(&context.model.body, segment) {
-                continue;
+        let found = (0..self.search.segments.found().len()).any(|index| {
+            let segment = self.search.segments.found()[index];
+            self.search.is_body_sized(&context.model.body, segment) && {
+                let bounds = segment.bounds.enlarged(context.config.body_box_margin);
+                self.candidates.gather(views, &bounds, context.config);
+                let observation = context.observation.with(&self.candidates);
+                let at = Context { observation, previous: &[], time_scale: UNKNOWN_MOTION, ..context };
+                self.search.try_segment(segment, at, fit, &mut self.trials, present)
             }
-            let margin = Vec3::splat(context.config.body_box_margin);
-            let bounds = Aabb::new(segment.low - margin, segment.high + margin);
-            self.candidates.gather(frame, origin, &bounds, backgrounds, context.config);
-            let observation = context.observation.with(&self.candidates);
-            let at = Context { observation, previous: &[], time_scale: UNKNOWN_MOTION, ..context };
-            found = self.search.try_segment(segment, at, fit, &mut self.trials, present);
-        }
+        });
         fit.swap_matches(&mut self.matched);
         found
     }
@@ -331,5 +257,35 @@ mod tests {
             put_board(&mut pixels, Vec3::new(0.0, 0.0, depth), size);
             assert_eq!(found(&pixels), None, "{size:?}");
         }
+    }
+
+    fn after(frames: impl IntoIterator<Item = FrameOutcome>) -> Option<usize> {
+        let mut relocalizer = Relocalizer::default();
+        frames.into_iter().for_each(|outcome| relocalizer.observe(outcome, &[]));
+        relocalizer.frames_searched()
+    }
+
+    fn outcome(lost: bool) -> FrameOutcome {
+        FrameOutcome { lost, tracked: !lost, silent: false }
+    }
+
+    #[test]
+    fn a_body_is_searched_for_from_the_second_lost_frame_on() {
+        let searched = |frames| after([outcome(true)].repeat(frames));
+        assert_eq!([1, 2, 3, 4].map(searched), [None, Some(0), Some(1), Some(2)]);
+    }
+
+    #[test]
+    fn a_single_lost_frame_is_ignored_and_frames_without_images_do_not_count() {
+        assert_eq!(after([false, true, false, true].map(outcome)), None);
+        let silent = FrameOutcome { silent: true, ..outcome(true) };
+        assert_eq!(after([silent; 20]), None);
+    }
+
+    #[test]
+    fn a_tracked_body_is_no_longer_lost_and_a_degraded_one_is() {
+        let degraded = FrameOutcome { tracked: false, ..outcome(false) };
+        let back = |last| after([outcome(true), outcome(true), last]);
+        assert_eq!([outcome(false), degraded].map(back), [None, Some(0)]);
     }
 }

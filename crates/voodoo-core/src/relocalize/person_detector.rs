@@ -2,99 +2,92 @@
 //! and to verify a track.
 
 use super::detection_check::{ELSEWHERE, distance_cost};
+use super::{Reasons, Relocalizer};
 use crate::body::Body;
-use crate::detect::{
-    BoundDetector, Detect, DetectError, Detected, DetectionQuery, JointMap, PlacedDetection, Surroundings,
-};
+use crate::detect::{Detect, DetectError, Detected, DetectionQuery, JointMap, PlacedDetection, Surroundings};
 use crate::math::Vec3;
 use crate::observation::frame::{Frame, Ground};
 use crate::observation::observer::Own;
 use crate::observation::ownership::OwnershipMask;
 
-/// Runs the detector and stores its last detection.
-#[derive(Debug, Default)]
-pub(super) struct PersonDetector {
-    detector: BoundDetector,
-    detection: Option<PlacedDetection>,
-    /// Number of the image with the detection.
-    image: usize,
-    /// Log odds that the object at the queried position is a person; the largest over all images.
-    person_odds: Option<f64>,
-    /// The floor on which the body stood when it was found, world frame.
-    pub(super) floor: Option<Ground>,
-}
-
-impl PersonDetector {
-    /// Sets the detector for this body, or removes it.
-    pub(super) fn set_detector(&mut self, detector: Option<Box<dyn Detect>>, body: &Body) {
+impl Relocalizer {
+    /// Sets the detector that finds this body, or removes it.
+    pub(crate) fn set_detector(&mut self, detector: Option<Box<dyn Detect>>, body: &Body) {
         self.detector.set(detector, body);
     }
 
-    /// Rebinds the detector after the body has changed.
-    pub(super) fn bind(&mut self, body: &Body) {
+    /// Rebinds the detector after the body's limbs or sites have changed.
+    pub(crate) fn bind(&mut self, body: &Body) {
         self.detector.bind(body);
     }
 
-    /// Whether there is a detector that can find the body.
-    pub(super) fn detects(&self) -> bool {
+    /// Whether the body can be found without a pose.
+    pub(crate) fn can_detect(&self) -> bool {
         self.detector.knows()
     }
 
     /// Returns the map from the detector's joints to the body.
-    pub(super) fn map(&self) -> &JointMap {
+    pub(crate) fn map(&self) -> &JointMap {
         self.detector.map()
     }
 
     /// The error of the detector, if it failed since [`Self::clear_error`].
-    pub(super) fn error(&self) -> Option<&DetectError> {
+    pub(crate) fn error(&self) -> Option<&DetectError> {
         self.detector.error()
     }
 
     /// Clears the detector's last error.
-    pub(super) fn clear_error(&mut self) {
+    pub(crate) fn clear_error(&mut self) {
         self.detector.clear_error();
     }
 
+    /// Takes this detection for the one of this frame.
+    pub(crate) fn set_detection(&mut self, detection: PlacedDetection) {
+        self.detection = Some(detection);
+    }
+
+    /// Drops the detection of this frame if it is too far from a position, world frame, to be of a person who was tracked `elapsed`
+    /// seconds before.
+    pub(crate) fn forget_somebody_else(&mut self, root: Vec3, elapsed: f64) {
+        self.detection.take_if(|detection| distance_cost(detection.root.distance(root), elapsed).is_infinite());
+    }
+
+    /// Drops the detection of this frame.
+    pub(crate) fn forget(&mut self) {
+        (self.detection, self.person_odds) = (None, None);
+    }
+
     /// Returns the detection of this frame, if there is one.
-    pub(super) fn detection(&self) -> Option<Detected<'_>> {
+    pub(crate) fn detected(&self) -> Option<Detected<'_>> {
         self.detection.as_ref().map(|detection| Detected { detection: &detection.detection, map: self.detector.map() })
     }
 
-    /// Stores the floor under the detection if the track was `found` by the detector; clears it otherwise.
-    pub(super) fn keep_floor(&mut self, found: bool) {
-        self.floor = self.detection().filter(|_| found).and_then(floor_under);
-    }
-
     /// Returns the pixels of the detection.
-    pub(super) fn own_pixels(&self) -> Own<'_> {
+    pub(crate) fn own_pixels(&self) -> Own<'_> {
         let pixels = self.detection.as_ref().map_or(&[][..], |detection| &detection.detection.pixels);
         Own { image: self.image, pixels }
     }
 
-    /// Returns the log odds that the object at the expected position is a person, if there is an object of that size.
-    pub(super) fn person_odds(&self) -> Option<f64> {
-        self.person_odds
+    /// Records how the track was started: `auto_initialized` by the detector, whose detection tells the floor, or by the user.
+    pub(crate) fn record_start(&mut self, auto_initialized: bool) {
+        self.check.auto_initialized = auto_initialized;
+        self.floor = self.detected().filter(|_| auto_initialized).and_then(floor_under);
     }
 
-    /// Takes this detection for the one of this frame.
-    pub(super) fn set_detection(&mut self, detection: PlacedDetection) {
-        self.detection = Some(detection);
-    }
-
-    /// Clears the detection if it is too far from a position, world frame, to be of a person who was tracked `elapsed` seconds
-    /// before.
-    pub(super) fn forget_somebody_else(&mut self, root: Vec3, elapsed: f64) {
-        self.detection.take_if(|detection| distance_cost(detection.root.distance(root), elapsed).is_infinite());
-    }
-
-    /// Clears the detection.
-    pub(super) fn forget(&mut self) {
-        (self.detection, self.person_odds) = (None, None);
-    }
-
-    /// Runs the detector on the owned pixels of all depth images of a frame; keeps one detection.
-    pub(super) fn detect(&mut self, body: &Body, frame: &Frame, ownership: OwnershipMask, query: DetectionQuery) {
+    /// Runs the detector on the owned part of a frame where that is due. `root` is the expected position of the body, world frame.
+    pub(crate) fn detect(
+        &mut self,
+        body: &Body,
+        frame: &Frame,
+        ownership: OwnershipMask,
+        root: Vec3,
+        reasons: Reasons,
+    ) {
         self.forget();
+        if !self.check.is_due(frame.stamp, reasons, ownership.others) || !self.can_detect() {
+            return;
+        }
+        let query = if reasons.anywhere { DetectionQuery::Any } else { DetectionQuery::Near(root) };
         for (number, image) in frame.images.iter().enumerate() {
             let (owners, own) = (ownership.owners(number), Some(ownership.own));
             let around =

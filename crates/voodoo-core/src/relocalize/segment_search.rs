@@ -6,7 +6,7 @@ use super::trials::Trials;
 use crate::body::Body;
 use crate::fit::{Context, Fit};
 use crate::hypotheses::SWIVELS;
-use crate::math::{Pose, Quat, Vec3};
+use crate::math::{Pose, Quat, Vec3, refill};
 use crate::observation::candidates::body_box;
 use crate::observation::segments::{Segment, Segments};
 
@@ -23,19 +23,13 @@ pub(super) struct SegmentSearch {
 impl SegmentSearch {
     /// Stores the poses of a tracked body.
     pub(super) fn remember(&mut self, poses: &[Pose]) {
-        self.tracked.clear();
-        self.tracked.extend_from_slice(poses);
-    }
-
-    /// Returns a segment by its index; the largest comes first.
-    pub(super) fn segment(&self, index: usize) -> Option<Segment> {
-        self.segments.found().get(index).copied()
+        refill(&mut self.tracked, poses.iter().copied());
     }
 
     /// Whether the longest side of a segment is between half and twice that of the body.
     pub(super) fn is_body_sized(&self, body: &Body, segment: Segment) -> bool {
         let length = body_box(body, &self.tracked, 0.0).extents().max_element();
-        let extent = (segment.high - segment.low).max_element();
+        let extent = segment.bounds.extents().max_element();
         extent > 0.5 * length && extent < 2.0 * length
     }
 
@@ -53,14 +47,12 @@ impl SegmentSearch {
         let stood = tracked.first().map_or(Vec3::Z, |root| root.rotation * Vec3::Z);
         let up = context.observation.frame().ground.map_or(stood, |ground| ground.normal);
         let middle = body_box(&context.model.body, tracked, 0.0).center();
-        let there = 0.5 * (segment.low + segment.high);
         best.clear();
         let mut least = f64::INFINITY;
         for turn in 0..SWIVELS {
             let turn = Quat::from_axis_angle(up, std::f64::consts::TAU * turn as f64 / SWIVELS as f64);
-            let moved = Pose::from_parts(there - turn * middle, turn);
-            turned.clear();
-            turned.extend(tracked.iter().map(|pose| moved * *pose));
+            let moved = Pose::from_parts(segment.bounds.center() - turn * middle, turn);
+            refill(turned, tracked.iter().map(|pose| moved * *pose));
             let stray = trials.stray_fraction(context, turned);
             // Of two rotations that explain equally many points, the smaller one is kept.
             if stray < least {

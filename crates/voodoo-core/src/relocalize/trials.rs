@@ -2,7 +2,7 @@
 
 use crate::fit::{Context, Fit};
 use crate::hypotheses::{Objective, REFINE, ROUGH_SAMPLE, explain};
-use crate::math::{Pose, WeightedPoints};
+use crate::math::{Pose, WeightedPoints, refill, reset};
 use crate::visibility::EXPLAINED;
 
 /// Maximum fraction of the points of a segment that a body found there may leave far from it.
@@ -19,17 +19,12 @@ pub(super) struct Trials {
     sample: WeightedPoints,
     nearest: Vec<f32>,
     distances: Vec<f32>,
-    /// The poses under trial, and their start.
-    poses: Vec<Pose>,
+    /// The poses of the last trial, and their start.
+    pub(super) poses: Vec<Pose>,
     predicted: Vec<Pose>,
 }
 
 impl Trials {
-    /// Returns the poses of the last trial.
-    pub(super) fn poses(&self) -> &[Pose] {
-        &self.poses
-    }
-
     /// Tries the body at the poses `place`. Returns whether it explains the points there better than the present pose does.
     pub(super) fn try_at(&mut self, context: Context, fit: &mut Fit, present: &[Pose], place: &[Pose]) -> bool {
         fit.match_all(context, present, context.config.max_steps);
@@ -77,8 +72,7 @@ impl Trials {
         let candidates = context.observation.candidates;
         sample.assign(&candidates.points, &candidates.weight);
         sample.subsample(ROUGH_SAMPLE);
-        nearest.clear();
-        nearest.resize(sample.len(), f32::INFINITY);
+        reset(nearest, sample.len(), f32::INFINITY);
         for limb in 0..poses.len() {
             explain(&context.model.body, limb, poses, &sample.points, nearest, distances);
         }
@@ -87,10 +81,8 @@ impl Trials {
     /// Refines `place` by a few ICP steps and returns its cost; `poses` and `fit` then hold the refined pose and its matches.
     fn refine(&mut self, context: Context, fit: &mut Fit, place: &[Pose]) -> f64 {
         let Self { poses, predicted, .. } = self;
-        for start in [&mut *poses, &mut *predicted] {
-            start.clear();
-            start.extend_from_slice(place);
-        }
+        refill(poses, place.iter().copied());
+        predicted.clone_from(poses);
         for step in 0..REFINE {
             fit.step(context, predicted, poses, step);
         }

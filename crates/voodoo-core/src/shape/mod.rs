@@ -22,7 +22,7 @@ mod bounds;
 mod closest;
 mod contour;
 mod kernel;
-pub(crate) mod ray;
+mod ray;
 mod ruling;
 mod section;
 
@@ -79,7 +79,7 @@ pub enum ShapeError {
 
 /// The face of the closed surface on which a point lies.
 ///
-/// [`SurfaceBatch`] and [`RayHit`](crate::RayHit) have examples.
+/// [`SurfaceBatch`] has an example.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Region {

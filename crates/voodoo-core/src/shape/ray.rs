@@ -1,38 +1,13 @@
 //! Ray casting against the closed surface.
 
-use super::ruling::Angle;
-use super::{Region, TaperedEllipticCylinder};
+use super::TaperedEllipticCylinder;
 use crate::math::Vec3;
-
-/// The point at which a ray enters the solid, limb frame.
-///
-/// ```
-/// use voodoo_core::math::Vec3;
-/// use voodoo_core::{Region, TaperedEllipticCylinder};
-///
-/// let forearm = TaperedEllipticCylinder::new(0.25, 0.05, 0.05, 0.05, 0.05)?;
-/// let hit = forearm.cast_ray(Vec3::new(1.0, 0.0, 0.1), -Vec3::X, 2.0).ok_or("no hit")?;
-/// assert!((hit.distance - 0.95).abs() < 1e-9 && hit.region == Region::Side);
-/// assert_eq!(forearm.cast_ray(Vec3::new(1.0, 0.0, 0.3), -Vec3::X, 2.0), None); // beyond the distal cap
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RayHit {
-    /// Distance from the origin of the ray, meters.
-    pub distance: f64,
-    /// The point on the surface, meters.
-    pub point: Vec3,
-    /// Outward unit normal there.
-    pub normal: Vec3,
-    /// Face of the surface: side or cap.
-    pub region: Region,
-}
 
 /// A polynomial of degree 4 at most, constant term first.
 type Quartic = [f64; 5];
 
 impl TaperedEllipticCylinder {
-    /// The first point at which a ray passes from outside to inside, limb frame, at most `max_distance` meters away.
+    /// Distance in meters at which a ray first passes from outside to inside, limb frame.
     ///
     /// `direction` need not be a unit vector. Returns `None` when the ray misses, only touches the surface, or is not finite. A
     /// ray that starts inside is followed out of the solid and may enter it again, because the solid is not convex.
@@ -41,12 +16,23 @@ impl TaperedEllipticCylinder {
     /// quartic. The roots of each derivative are isolated by the roots of the next derivative. They divide the ray into intervals
     /// on which F is monotone. The first interval with a change from `F >= 0` to `F < 0` contains the hit, which is found by
     /// bisection. No root can be missed.
-    pub fn cast_ray(&self, origin: Vec3, direction: Vec3, max_distance: f64) -> Option<RayHit> {
+    ///
+    /// ```
+    /// use voodoo_core::TaperedEllipticCylinder;
+    /// use voodoo_core::math::Vec3;
+    ///
+    /// let forearm = TaperedEllipticCylinder::new(0.25, 0.05, 0.05, 0.05, 0.05)?;
+    /// let distance = forearm.cast_ray(Vec3::new(1.0, 0.0, 0.1), -Vec3::X).ok_or("no hit")?;
+    /// assert!((distance - 0.95).abs() < 1e-9);
+    /// assert_eq!(forearm.cast_ray(Vec3::new(1.0, 0.0, 0.3), -Vec3::X), None); // beyond the distal cap
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn cast_ray(&self, origin: Vec3, direction: Vec3) -> Option<f64> {
         let direction = direction.try_normalize()?;
-        if !origin.is_finite() || max_distance.is_nan() {
+        if !origin.is_finite() {
             return None;
         }
-        let (near, far, through_cap) = self.cross_box(origin, direction, max_distance)?;
+        let (near, far, through_cap) = self.cross_box(origin, direction)?;
         let base = origin + direction * near;
         let span = far - near;
         let at = |u: f64| {
@@ -55,30 +41,16 @@ impl TaperedEllipticCylinder {
             point
         };
         let inside = |u: f64| self.ellipse_sign(at(u)) < 0.0;
-        if let Some(proximal) = through_cap
-            && inside(0.0)
-        {
-            let (z, normal, region) = if proximal {
-                (0.0, Vec3::NEG_Z, Region::ProximalCap)
-            } else {
-                (self.length, Vec3::Z, Region::DistalCap)
-            };
-            return Some(RayHit { distance: near, point: Vec3::new(base.x, base.y, z), normal, region });
+        let mut was_inside = inside(0.0);
+        if through_cap && was_inside {
+            return Some(near);
         }
         let (turns, count) = turning_points(&self.level_along(base, direction * span));
         let mut start = 0.0;
-        let mut was_inside = inside(0.0);
         for end in turns.into_iter().take(count).chain([1.0]) {
             let is_inside = inside(end);
             if is_inside && !was_inside {
-                let u = bisect(start, end, inside);
-                let point = at(u);
-                return Some(RayHit {
-                    distance: near + u * span,
-                    point,
-                    normal: self.normal_at(point),
-                    region: Region::Side,
-                });
+                return Some(near + bisect(start, end, inside) * span);
             }
             (start, was_inside) = (end, is_inside);
         }
@@ -86,10 +58,10 @@ impl TaperedEllipticCylinder {
     }
 
     /// Distances at which a ray of unit direction enters and leaves the box around the shape, meters from its origin; and whether
-    /// it enters through a cap plane: `Some(true)` for the proximal one, `Some(false)` for the distal one. `None` when it misses.
-    fn cross_box(&self, origin: Vec3, direction: Vec3, max_distance: f64) -> Option<(f64, f64, Option<bool>)> {
-        let (mut near, mut far) = (0.0, max_distance);
-        let mut through_cap = None;
+    /// it enters through a cap plane. `None` when it misses.
+    fn cross_box(&self, origin: Vec3, direction: Vec3) -> Option<(f64, f64, bool)> {
+        let (mut near, mut far) = (0.0, f64::INFINITY);
+        let mut through_cap = false;
         // The box is enlarged laterally, so that F > 0 where the ray enters it through a side.
         let size = self.local_aabb().maxs * 1.001;
         for (axis, min, max) in [(0, -size.x, size.x), (1, -size.y, size.y), (2, 0.0, self.length)] {
@@ -103,25 +75,11 @@ impl TaperedEllipticCylinder {
             let (first, last) = if rate > 0.0 { (min, max) } else { (max, min) };
             let entry = (first - start) / rate;
             if entry >= near {
-                near = entry;
-                through_cap = (axis == 2).then_some(rate > 0.0);
+                (near, through_cap) = (entry, axis == 2);
             }
             far = f64::min(far, (last - start) / rate);
         }
-        if near > far {
-            return None;
-        }
-        Some((near, far, through_cap))
-    }
-
-    /// Outward normal at a point of the side.
-    fn normal_at(&self, point: Vec3) -> Vec3 {
-        let (a, b) = self.semi_axes(point.z);
-        let angle = Angle::from_vector(point.x.abs() * b, point.y.abs() * a)
-            .or(Angle::from_vector(point.x.abs(), point.y.abs()))
-            .unwrap_or(Angle::ZERO);
-        let normal = self.side_normal(angle, (point.z / self.length).clamp(0.0, 1.0));
-        Vec3::new(normal.x.copysign(point.x), normal.y.copysign(point.y), normal.z)
+        (near <= far).then_some((near, far, through_cap))
     }
 
     /// The coefficients of `F` along `base + u step`.

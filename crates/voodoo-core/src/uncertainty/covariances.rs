@@ -3,7 +3,7 @@
 use nalgebra::Matrix6;
 
 use crate::body::Body;
-use crate::math::{Mat3, Vec3};
+use crate::math::{Mat3, Vec3, reset};
 
 /// Covariances of a frame's pose. World frame, meters, radians; NaN before the first frame.
 ///
@@ -26,43 +26,31 @@ pub struct Covariances {
 impl Covariances {
     /// Sets all covariances of this body to NaN.
     pub(crate) fn forget(&mut self, body: &Body) {
-        self.clear();
-        self.sites.resize(body.sites().len(), Mat3::NAN);
-        self.limbs.resize(body.limbs().len(), [[f64::NAN; 6]; 6]);
-        self.turns.resize(body.limbs().len(), Mat3::NAN);
-        self.lengths.resize(body.limbs().len(), f64::NAN);
-        self.girths.resize(body.limbs().len(), f64::NAN);
+        reset(&mut self.sites, body.sites().len(), Mat3::NAN);
+        reset(&mut self.limbs, body.limbs().len(), [[f64::NAN; 6]; 6]);
+        reset(&mut self.turns, body.limbs().len(), Mat3::NAN);
+        reset(&mut self.lengths, body.limbs().len(), f64::NAN);
+        reset(&mut self.girths, body.limbs().len(), f64::NAN);
     }
 
-    pub(super) fn clear(&mut self) {
-        self.sites.clear();
-        self.limbs.clear();
-        self.turns.clear();
-        self.lengths.clear();
-        self.girths.clear();
-    }
-
-    /// Adds a limb: the covariance of its rotation and translation, the deviation of joints from their positions in it, and the
-    /// covariance of its joint's rotations about `axes`.
-    pub(super) fn push_limb(&mut self, limb: &Matrix6<f64>, site_sigma: f64, joint: &Matrix6<f64>, axes: [Vec3; 3]) {
+    /// Sets those of a limb from the covariance of its rotation and translation, and the deviation of joints from their positions
+    /// in it.
+    pub(super) fn set_limb(&mut self, limb: usize, covariance: &Matrix6<f64>, site_sigma: f64) {
         let place = |index: usize| (index + 3) % 6;
-        let mut own = [[0.0; 6]; 6];
-        for (i, row) in own.iter_mut().enumerate() {
-            for (j, value) in row.iter_mut().enumerate() {
-                *value = limb[(place(i), place(j))];
-            }
-        }
+        let mut own = std::array::from_fn(|i| std::array::from_fn(|j| covariance[(place(i), place(j))]));
         (0..3).for_each(|axis| own[axis][axis] += site_sigma * site_sigma);
-        self.limbs.push(own);
-        let axes = Mat3::from_cols_array_2d(&axes.map(|axis| axis.to_array()));
-        let turns = Mat3::from_cols_array_2d(&[0, 1, 2].map(|j| [0, 1, 2].map(|i| joint[(i, j)])));
-        self.turns.push(symmetric(axes * turns * axes.transpose()));
-        self.lengths.push(f64::NAN);
-        self.girths.push(f64::NAN);
+        self.limbs[limb] = own;
     }
 
-    /// Adds a site at `lever` from the origin of its limb's frame, world axes.
-    pub(super) fn push_site(&mut self, limb: usize, lever: Vec3) {
+    /// Sets that of the rotation of a limb's joint from the covariance of the rotations about its axes.
+    pub(super) fn set_turn(&mut self, limb: usize, joint: &Matrix6<f64>, [x, y, z]: [Vec3; 3]) {
+        let axes = Mat3::from_cols(x, y, z);
+        let turns = Mat3::from_cols_array_2d(&[0, 1, 2].map(|j| [0, 1, 2].map(|i| joint[(i, j)])));
+        self.turns[limb] = symmetric(axes * turns * axes.transpose());
+    }
+
+    /// Sets that of a site at `lever` from the origin of its limb's frame, world axes.
+    pub(super) fn set_site(&mut self, site: usize, limb: usize, lever: Vec3) {
         let own = &self.limbs[limb];
         let block = |row: usize, column: usize| {
             Mat3::from_cols_array_2d(&[0, 1, 2].map(|j| [0, 1, 2].map(|i| own[row + i][column + j])))
@@ -71,7 +59,7 @@ impl Covariances {
         let turned = Mat3::from_cols(Vec3::X.cross(lever), Vec3::Y.cross(lever), Vec3::Z.cross(lever));
         let mixed = turned * block(3, 0);
         let covariance = block(0, 0) + mixed + mixed.transpose() + turned * block(3, 3) * turned.transpose();
-        self.sites.push(symmetric(covariance));
+        self.sites[site] = symmetric(covariance);
     }
 }
 
@@ -89,9 +77,10 @@ mod tests {
         let lever = Vec3::new(0.1, -0.3, 0.2);
         let limb = Matrix6::from_fn(|i, j| ((i * 5 + j * 3) % 7) as f64 - 3.0);
         let limb = limb * limb.transpose() * 1e-4;
-        let mut covariances = Covariances::default();
-        covariances.push_limb(&limb, 0.02, &Matrix6::zeros(), [Vec3::X, Vec3::Y, Vec3::Z]);
-        covariances.push_site(0, lever);
+        let (sites, limbs) = (vec![Mat3::NAN], vec![[[f64::NAN; 6]; 6]]);
+        let mut covariances = Covariances { sites, limbs, ..Covariances::default() };
+        covariances.set_limb(0, &limb, 0.02);
+        covariances.set_site(0, 0, lever);
         // Finite differences of the site's position for small rotations and translations of the limb.
         let h = 1e-6;
         let column = |index: usize| match index {

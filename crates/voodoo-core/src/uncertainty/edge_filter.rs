@@ -61,7 +61,7 @@ impl EdgeFilter {
     ) {
         let body = &model.body;
         self.expect(body, time_scale);
-        self.sum_terms(body, &model.extremities, poses, correspondences, config);
+        self.sum_terms(model, poses, correspondences, config);
         let Self { normal, system, spread, known, sigma, .. } = self;
         sigma.clear();
         if !system.factor_added(body, normal, poses, known) {
@@ -114,15 +114,8 @@ impl EdgeFilter {
     }
 
     /// Adds the frame's information on every limb, weighted by how strongly the limb is supported.
-    fn sum_terms(
-        &mut self,
-        body: &Body,
-        extremities: &[TwoBone],
-        poses: &[Pose],
-        correspondences: &Correspondences,
-        config: &Config,
-    ) {
-        let normal = &mut self.normal;
+    fn sum_terms(&mut self, model: &Model, poses: &[Pose], correspondences: &Correspondences, config: &Config) {
+        let (normal, Model { body, extremities, .. }) = (&mut self.normal, model);
         normal.clear(poses.len());
         Regions { pairs: &correspondences.regions, colors: None }.add(body, poses, normal);
         for (limb, block) in normal.limbs.iter_mut().enumerate() {

@@ -86,25 +86,24 @@ impl Uncertainty {
         self.expect(found);
         self.sum_terms(found, proven);
         let Self { normal, system, spread, variance, information, .. } = self;
+        covariances.forget(found.body);
         if !system.factor_information(found.body, normal, found.poses, information) {
-            covariances.forget(found.body);
             return;
         }
-        covariances.clear();
         variance.clear();
         for (limb, part) in found.body.limbs().iter().enumerate() {
-            let pose = &found.poses[limb];
             let own = spread.of_joint(system, limb);
             variance.extend((0..freedoms(part)).map(|index| own[(index, index)]));
             let axes = part
                 .parent
                 .as_ref()
                 .map_or([Vec3::X, Vec3::Y, Vec3::Z], |(parent, joint)| joint_axes(joint, &found.poses[*parent]).0);
-            let site_sigma = SITE_SIGMA[usize::from(found.sizes_found)];
-            covariances.push_limb(&spread.of_limb(system, limb, pose.translation), site_sigma, &own, axes);
+            covariances.set_turn(limb, &own, axes);
+            let covariance = spread.of_limb(system, limb, found.poses[limb].translation);
+            covariances.set_limb(limb, &covariance, SITE_SIGMA[usize::from(found.sizes_found)]);
         }
-        for site in found.body.sites() {
-            covariances.push_site(site.limb, found.poses[site.limb].rotation * site.position);
+        for (index, site) in found.body.sites().iter().enumerate() {
+            covariances.set_site(index, site.limb, found.poses[site.limb].rotation * site.position);
         }
         self.learn_lengths(found);
         for (pair, known) in found.pairs.iter().zip(&self.known) {
@@ -150,11 +149,8 @@ impl Uncertainty {
     fn sum_terms(&mut self, found: FittedPose, proven: impl Fn(usize) -> bool) {
         let FittedPose { body, poses, correspondences, config, .. } = found;
         self.normal.clear(poses.len());
-        Measurements::new(correspondences, config, config.kernel_end, SITE_SCALE, true).add(
-            body,
-            poses,
-            &mut self.normal,
-        );
+        let measurements = Measurements::new(correspondences, config, config.kernel_end, SITE_SCALE, true);
+        measurements.add(body, poses, &mut self.normal);
         for (limb, block) in self.normal.limbs.iter_mut().enumerate() {
             let most = PATCHES_PER_METER * body.limbs()[limb].shape.length();
             let lines = correspondences.regions.iter().filter(|pair| pair.limb == limb).count();

@@ -73,7 +73,7 @@ pub(crate) fn measure_support(
 
 /// Whether another limb hides a point of a limb, camera frame.
 fn is_hidden(raycasters: &[LimbRaycaster], limb: usize, point: Vec3) -> bool {
-    let hides = |other: &LimbRaycaster| other.depth_at(point.x / point.z, point.y / point.z) < point.z - OVERLAP;
+    let hides = |other: &LimbRaycaster| other.depth_before(point) < point.z - OVERLAP;
     raycasters.iter().enumerate().any(|(other, caster)| other != limb && hides(caster))
 }
 
@@ -103,13 +103,12 @@ fn support_in_view(
             if is_hidden(raycasters, limb, point) {
                 continue;
             }
-            let depth = |other: &LimbRaycaster| other.depth_at(point.x / point.z, point.y / point.z);
             if sight == PatchVisibility::FreeSpace {
                 count(&mut support.free_space);
             } else if let Some(z) = place.depth_within(EXPLAINED) {
                 let unrelated = |other: &usize| *other != limb && !chain.limbs().any(|kin| kin == *other);
                 let mut unrelated = raycasters.iter().enumerate().filter(|(other, _)| unrelated(other));
-                if !unrelated.any(|(_, other)| (depth(other) - z).abs() < EXPLAINED) {
+                if !unrelated.any(|(_, other)| (other.depth_before(point) - z).abs() < EXPLAINED) {
                     count(&mut support.own);
                 }
             }

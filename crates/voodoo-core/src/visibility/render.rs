@@ -112,11 +112,11 @@ impl Rendering {
         view: &Viewpoint,
         pool: Option<&rayon::ThreadPool>,
     ) -> Result<(), TrackError> {
-        check_pose(|| "world_from_sensor".into(), &view.world_from_sensor)?;
+        check_pose("world_from_sensor", &view.world_from_sensor)?;
         let [poses, limbs] = [world_from_limb.len(), body.limbs().len()];
-        let found = || format!("{poses} poses for {limbs} limbs, or one not finite");
+        let found = format_args!("{poses} poses for {limbs} limbs, or one not finite");
         let valid = poses == limbs && world_from_limb.iter().all(is_rigid);
-        TrackError::unless(valid, || "world_from_limb".into(), "one rigid pose a limb", found)?;
+        TrackError::unless(valid, "world_from_limb", "one rigid pose a limb", found)?;
         let Self { width, depth, limb, raycasters } = self;
         *width = view.camera.width();
         reset(depth, view.camera.pixels(), 0.0);
@@ -201,12 +201,18 @@ impl LimbRaycaster {
         }
     }
 
-    /// Returns the depth at which the ray through `(x / z, y / z)` meets the limb, meters; NaN if it misses.
+    /// Returns the depth at which the ray to a point, camera frame, meets the limb, meters; NaN if it misses.
     #[inline(always)]
-    pub(crate) fn depth_at(&self, x: f64, y: f64) -> f64 {
+    pub(crate) fn depth_before(&self, point: Vec3) -> f64 {
+        let (x, y) = (point.x / point.z, point.y / point.z);
         // Most rays do not come near most limbs.
-        let near = (x >= self.low[0]) & (x <= self.high[0]) & (y >= self.low[1]) & (y <= self.high[1]);
-        if near { self.depth_within(x, y) } else { f64::NAN }
+        if self.is_near(x, y) { self.depth_within(x, y) } else { f64::NAN }
+    }
+
+    /// Whether the ray through `(x / z, y / z)` may meet the limb.
+    #[inline(always)]
+    fn is_near(&self, x: f64, y: f64) -> bool {
+        (x >= self.low[0]) & (x <= self.high[0]) & (y >= self.low[1]) & (y <= self.high[1])
     }
 
     #[inline(never)]
@@ -217,8 +223,7 @@ impl LimbRaycaster {
 
     fn intersect_exactly(&self, x: f64, y: f64) -> f64 {
         let direction = self.axes[0] * x + self.axes[1] * y + self.axes[2];
-        let hit = self.shape.cast_ray(self.origin, direction, f64::INFINITY);
-        hit.map_or(f64::NAN, |hit| hit.distance / direction.length())
+        self.shape.cast_ray(self.origin, direction).map_or(f64::NAN, |distance| distance / direction.length())
     }
 
     /// Returns the columns of a row that the limb can cover; all of them where the lens may bend straight lines.
@@ -263,14 +268,7 @@ impl LimbRaycaster {
             let (first, end) = self.span(view.camera, row);
             for start in (first..end).step_by(LANES) {
                 let (x, y) = view.lanes(row, start);
-                let mut near = false;
-                for lane in 0..LANES {
-                    near |= (x[lane] >= self.low[0])
-                        & (x[lane] <= self.high[0])
-                        & (y[lane] >= self.low[1])
-                        & (y[lane] <= self.high[1]);
-                }
-                if !near {
+                if !(0..LANES).fold(false, |near, lane| near | self.is_near(x[lane], y[lane])) {
                     continue;
                 }
                 let found = self.intersect(&x, &y);
