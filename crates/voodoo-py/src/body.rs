@@ -6,7 +6,7 @@ use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::{HumanModel, Joint, Limb, Site};
 
 use crate::arrays::{Array, frozen};
-use crate::errors::{BodyError, Raise};
+use crate::errors::{BodyError, raise};
 use crate::shape::PyShape;
 
 /// A rotation as Python represents it.
@@ -109,7 +109,7 @@ impl PyBody {
                 })
             })
             .collect::<PyResult<Vec<_>>>()?;
-        Body::new(name, limbs, sites).map(Self).map_err(Raise::raise)
+        Body::new(name, limbs, sites).map(Self).map_err(raise)
     }
 
     #[staticmethod]
@@ -119,11 +119,11 @@ impl PyBody {
             let text = format!("model: expected \"measured\", \"full\" or \"papers\", found {model:?}");
             BodyError::new_err(text)
         })?;
-        Body::human(stature, found.1).map(Self).map_err(Raise::raise)
+        Body::human(stature, found.1).map(Self).map_err(raise)
     }
 
     fn scaled(&self, factor: f64) -> PyResult<Self> {
-        self.0.scaled(factor).map(Self).map_err(Raise::raise)
+        self.0.scaled(factor).map(Self).map_err(raise)
     }
 
     /// The parts that `new` takes, rotations as vectors.

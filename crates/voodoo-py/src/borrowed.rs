@@ -8,7 +8,7 @@ use voodoo_core::{Body, Camera};
 use voodoo_core::{Cloud, ColorImage, DepthImage, DetectedPerson, Frame, PositionRelation, RayRelation, Scope};
 
 use crate::arrays::{ColorArray, ColorView, DepthArray, DepthView, PointArray, PointView};
-use crate::errors::Raise;
+use crate::errors::raise;
 use crate::frame::PyFrame;
 
 /// Index of a name in a list, which it joins if it is new.
@@ -78,9 +78,9 @@ impl<'py, 'a> Borrowed<'py, 'a> {
     /// Borrows the arrays of a frame and looks the names up in `body`. The frame's sources are numbered from `first`.
     pub(crate) fn new(py: Python<'py>, frame: &'a PyFrame, body: &Body, first: usize) -> PyResult<Self> {
         let first = first as u16;
-        let index = |name: &str| body.site_index(name).map_err(Raise::raise);
+        let index = |name: &str| body.site_index(name).map_err(raise);
         let cloud = |(points, cloud, limb): &'a CloudData| {
-            let limb = limb.as_ref().map(|name| body.limb_index(name)).transpose().map_err(Raise::raise)?;
+            let limb = limb.as_ref().map(|name| body.limb_index(name)).transpose().map_err(raise)?;
             let (scope, source) = (limb.map_or(cloud.scope, Scope::Limb), cloud.source + first);
             Ok((points.view(py), Cloud { scope, source, ..*cloud }))
         };

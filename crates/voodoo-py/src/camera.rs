@@ -9,7 +9,7 @@ use voodoo_core::{Camera, Lens, Rendering, Viewpoint};
 
 use crate::arrays::{limb_poses, pose, rows};
 use crate::body::PyBody;
-use crate::errors::{MeasurementError, Raise, wrong_argument};
+use crate::errors::{CameraError, MeasurementError, raise, wrong_argument};
 
 type Arguments = (usize, usize, [f64; 4], String, Vec<f64>);
 
@@ -23,7 +23,7 @@ impl PyCamera {
     fn new(width: usize, height: usize, intrinsics: [f64; 4], model: String, coefficients: Vec<f64>) -> PyResult<Self> {
         let camera = Lens::from_model(&model, &coefficients)
             .and_then(|lens| Camera::new(width, height, intrinsics, lens))
-            .map_err(Raise::raise)?;
+            .map_err(|error| CameraError::new_err(error.to_string()))?;
         Ok(Self(Arc::new(camera)))
     }
 
@@ -96,7 +96,7 @@ pub(crate) fn render_depth<'py>(
     let world_from_sensor = pose("world_from_sensor", world_from_sensor)?;
     let view = Viewpoint { camera: &camera, world_from_sensor };
     let mut image = Rendering::default();
-    py.detach(|| image.render(&body.0, &poses, &view, None)).map_err(Raise::raise)?;
+    py.detach(|| image.render(&body.0, &poses, &view, None)).map_err(raise)?;
     let size = [camera.height(), camera.width()];
     let depth = PyArray1::from_slice(py, image.depth()).reshape(size)?;
     // The mark of no limb, all ones, becomes -1; no body has 32768 limbs.

@@ -19,7 +19,7 @@ use voodoo_detect::{Detector, JOINTS, LENGTHS};
 use crate::arrays::{Row, contiguous, vector};
 use crate::borrowed::depth_images;
 use crate::camera::camera_of;
-use crate::errors::{ConfigError, MeasurementError, Raise, wrong_argument};
+use crate::errors::{ConfigError, MeasurementError, raise, wrong_argument};
 use crate::frame::PyFrame;
 
 #[doc = stub!("Detector")]
@@ -44,12 +44,12 @@ impl PyDetector {
     #[doc = stub!("Detector.detect")]
     #[pyo3(signature = (frame, *, up=None))]
     fn detect(&mut self, py: Python<'_>, frame: &PyFrame, up: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<PyDetection>> {
-        let any = Body::human(1.75, HumanModel::Full).map_err(Raise::raise)?;
+        let any = Body::human(1.75, HumanModel::Full).map_err(raise)?;
         let views = frame.depth_views(py);
         let images = depth_images(&views)?;
         let input =
             Frame::empty(frame.stamp).with_images(&images).with_ground(frame.ground).with_excluded(&frame.excluded);
-        input.check(&any, None).map_err(Raise::raise)?;
+        input.check(&any, None).map_err(raise)?;
         let direction = |up: &Bound<'_, PyAny>| {
             let wrong = || wrong_argument("up", "a vector that is not zero", up);
             vector("up", up)?.try_normalize().ok_or_else(wrong)

@@ -11,7 +11,7 @@ use voodoo_sensors::keypoints::{Sensor, SiteKeypoints, SiteMeasurement, SiteObse
 
 use crate::arrays::{PointArray, Row, rows};
 use crate::camera::{affine, camera_of};
-use crate::errors::Raise;
+use crate::errors::raise;
 use crate::people::TrackedBody;
 use crate::sites::{ALONG_SIGMA, PySiteGate, PySiteRay, places_of};
 
@@ -146,7 +146,7 @@ pub(crate) fn carried<'py>(
     let array = PointArray::new("points", points)?;
     let view = array.view(py);
     let moved = voodoo_sensors::carried::carried(view.points()?, tracker.tracker()?, elapsed, pose.as_ref());
-    let moved = moved.map_err(Raise::raise)?;
+    let moved = moved.map_err(raise)?;
     let array =
         |moved: Vec<Vec3>| PyArray1::from_iter(py, moved.iter().flat_map(Vec3::to_array)).reshape([moved.len(), 3]);
     moved.map(array).transpose()
@@ -163,5 +163,5 @@ pub(crate) fn nearest_surface(
 ) -> PyResult<Option<f64>> {
     let found =
         voodoo_sensors::registration::nearest_surface(rows("pixels", &pixels)?, depths.as_slice()?, pixel, radius);
-    found.map_err(Raise::raise)
+    found.map_err(raise)
 }

@@ -12,7 +12,7 @@ use crate::body::PyBody;
 use crate::borrowed::{Borrowed, Parts, color_image, depth_images};
 use crate::config::config;
 use crate::detector::{detector, warn_of_detector};
-use crate::errors::{BodyError, Raise};
+use crate::errors::{BodyError, raise};
 use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
 use crate::tracker::{PyTracker, site_positions};
@@ -69,7 +69,7 @@ impl PyPeople {
         let region = region.map(|(low, high)| Aabb::new(Vec3::from_array(low), Vec3::from_array(high)));
         let mut options = PeopleOptions::default();
         (options.limit, options.nearest, options.forget_after, options.region) = (limit, nearest, forget_after, region);
-        let mut people = People::new(body.0.clone(), config(values)?, options).map_err(Raise::raise)?;
+        let mut people = People::new(body.0.clone(), config(values)?, options).map_err(raise)?;
         if let Some(found) = self::detector(detector)? {
             people = people.with_detector(found);
         }
@@ -100,7 +100,7 @@ impl PyPeople {
         let frames: Vec<(usize, Frame)> =
             own.iter().zip(&parts).map(|((id, own), parts)| (*id, parts.frame(&input, own.stamp))).collect();
         let people = &mut self.people;
-        py.detach(|| people.step(&input, &frames)).map_err(Raise::raise)?;
+        py.detach(|| people.step(&input, &frames)).map_err(raise)?;
         self.detector_failures += usize::from(people.detector_error().is_some());
         warn_of_detector(py, self.people.detector_error())?;
         let found = self.people.present().map(|(id, tracker)| {
@@ -120,7 +120,7 @@ impl PyPeople {
     /// Adds a person at these positions; returns their id.
     fn add(&mut self, joints: &Bound<'_, PyDict>, fit_sizes: bool) -> PyResult<usize> {
         let positions = site_positions(self.people.prototype(), joints)?;
-        self.people.add(&positions, fit_sizes).map_err(Raise::raise)
+        self.people.add(&positions, fit_sizes).map_err(raise)
     }
 
     /// Why a detected person is not tracked.

@@ -7,7 +7,7 @@ use voodoo_core::{SurfaceBatch, TaperedEllipticCylinder};
 
 use crate::arguments;
 use crate::arrays::{PointArray, Row, vector};
-use crate::errors::{MeasurementError, Raise, wrong_argument};
+use crate::errors::{BodyError, MeasurementError, wrong_argument};
 
 #[doc = stub!("TaperedEllipticCylinder")]
 #[pyclass(name = "TaperedEllipticCylinder", module = "voodoo", frozen, eq, from_py_object)]
@@ -34,7 +34,8 @@ impl PyShape {
         #[pyo3(from_py_with = arguments::a1)] a1: f64,
         #[pyo3(from_py_with = arguments::b1)] b1: f64,
     ) -> PyResult<Self> {
-        TaperedEllipticCylinder::new(length, a0, b0, a1, b1).map(Self).map_err(Raise::raise)
+        let shape = TaperedEllipticCylinder::new(length, a0, b0, a1, b1);
+        shape.map(Self).map_err(|error| BodyError::new_err(error.to_string()))
     }
 
     #[doc = stub!("TaperedEllipticCylinder.length")]

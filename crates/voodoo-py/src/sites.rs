@@ -6,7 +6,7 @@ use voodoo_core::math::Vec3;
 use voodoo_sensors::sites::SiteGate;
 
 use crate::arrays::{Row, vector};
-use crate::errors::{MeasurementError, Raise};
+use crate::errors::{MeasurementError, raise};
 use crate::people::TrackedBody;
 
 /// Predicted positions of some sites, from a mapping of names to positions; `None` for missing ones.
@@ -29,7 +29,7 @@ pub(crate) fn expected_sites<'py>(
     stamp: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
     let tracker = tracker.tracker()?;
-    let places = tracker.expected_sites(stamp).map_err(Raise::raise)?;
+    let places = tracker.expected_sites(stamp).map_err(raise)?;
     let named = tracker.body().sites().iter().zip(places).map(|(site, place)| (&site.name, Row(place)));
     named.into_py_dict(py)
 }

@@ -13,7 +13,7 @@ use voodoo_sensors::skin::depth::DepthBeside;
 
 use crate::arrays::{DepthArray, Row, rows};
 use crate::camera::{affine, camera_of};
-use crate::errors::{MeasurementError, Raise, wrong_argument};
+use crate::errors::{MeasurementError, raise, wrong_argument};
 use crate::people::TrackedBody;
 use crate::sites::places_of;
 
@@ -124,7 +124,7 @@ impl PySkinCue {
         let depth = depth.transpose()?;
         let beside = depth.as_ref().map(|(view, per_unit, camera, pose)| {
             let depth = Eye { world_from_sensor: *pose, camera };
-            DepthBeside::new(view.pixels()?, *per_unit, depth, eye).map_err(Raise::raise)
+            DepthBeside::new(view.pixels()?, *per_unit, depth, eye).map_err(raise)
         });
         let others = others.iter().map(TrackedBody::tracker).collect::<PyResult<Vec<_>>>()?;
         let input = SkinInput {
@@ -139,7 +139,7 @@ impl PySkinCue {
         };
         self.size = [camera.height(), camera.width()];
         let cue = &mut self.cue;
-        let found = py.detach(|| cue.observe(&input)).map_err(Raise::raise)?;
+        let found = py.detach(|| cue.observe(&input)).map_err(raise)?;
         Ok(found.iter().map(|site| (site.site, Row(site.direction), site.place.map(Row), site.depth)).collect())
     }
 
@@ -160,6 +160,6 @@ impl PySkinCue {
         let sites: Vec<Option<Vec3>> =
             sites.into_iter().map(|place| Some(place).filter(|place| !place.is_nan())).collect();
         let cue = &mut self.cue;
-        py.detach(|| cue.learn(image, &eye, &joints, &sites)).map_err(Raise::raise)
+        py.detach(|| cue.learn(image, &eye, &joints, &sites)).map_err(raise)
     }
 }

@@ -14,7 +14,7 @@ use crate::body::{JointParts, PyBody, joint};
 use crate::borrowed::{Borrowed, ColorData, ColorViews, color_image, depth_images, number};
 use crate::config::config;
 use crate::detector::{detector, warn_of_detector};
-use crate::errors::{MeasurementError, Raise, wrong_argument};
+use crate::errors::{MeasurementError, raise, wrong_argument};
 use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
 use crate::people::TrackedBody;
@@ -36,7 +36,7 @@ pub struct PyTracker {
 pub(crate) fn site_positions(body: &Body, joints: &Bound<'_, PyDict>) -> PyResult<Vec<(usize, Vec3)>> {
     let place = |(name, position): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
         let name: String = name.extract()?;
-        let site = body.site_index(&name).map_err(Raise::raise)?;
+        let site = body.site_index(&name).map_err(raise)?;
         Ok((site, vector(&format!("joints[{name}]"), &position)?))
     };
     joints.iter().map(place).collect()
@@ -52,7 +52,7 @@ pub(crate) fn body_before<'py>(
     let py = sites.py();
     let places: Vec<Vec3> = rows("sites", &sites)?.iter().map(|place| Vec3::from_array(*place)).collect();
     let found = tracker.tracker()?.body_before(&places, Vec3::from_array(camera));
-    Ok(PyArray1::from_vec(py, found.map_err(Raise::raise)?))
+    Ok(PyArray1::from_vec(py, found.map_err(raise)?))
 }
 
 impl PyTracker {
@@ -83,7 +83,7 @@ impl PyTracker {
         let colors = self.pictures(frame, &views)?;
         let input = Frame::empty(frame.stamp).with_colors(&colors);
         let tracker = &mut self.tracker;
-        py.detach(|| question(tracker, &input, poses.as_deref())).map_err(Raise::raise)
+        py.detach(|| question(tracker, &input, poses.as_deref())).map_err(raise)
     }
 
     fn body_changed(&mut self, py: Python<'_>) -> PyResult<()> {
@@ -96,7 +96,7 @@ impl PyTracker {
 impl PyTracker {
     #[new]
     fn new(body: &PyBody, values: &Bound<'_, PyDict>, detector: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let mut tracker = Tracker::new(body.0.clone(), config(values)?).map_err(Raise::raise)?;
+        let mut tracker = Tracker::new(body.0.clone(), config(values)?).map_err(raise)?;
         if let Some(found) = self::detector(detector)? {
             tracker = tracker.with_detector(found);
         }
@@ -120,7 +120,7 @@ impl PyTracker {
     #[pyo3(signature = (joints, *, fit_sizes=true))]
     fn _reset(&mut self, joints: &Bound<'_, PyDict>, fit_sizes: bool) -> PyResult<PyEstimate> {
         let positions = site_positions(self.tracker.body(), joints)?;
-        self.tracker.reset(&positions, fit_sizes).map_err(Raise::raise)?;
+        self.tracker.reset(&positions, fit_sizes).map_err(raise)?;
         self.body_changed(joints.py())?;
         self.sources.clear();
         Ok(self.estimate())
@@ -128,7 +128,7 @@ impl PyTracker {
 
     fn _reset_pose(&mut self, world_from_limb: Vec<Bound<'_, PyAny>>) -> PyResult<PyEstimate> {
         let poses = limb_poses(self.tracker.body(), &world_from_limb)?;
-        self.tracker.reset_pose(&poses).map_err(Raise::raise)?;
+        self.tracker.reset_pose(&poses).map_err(raise)?;
         self.sources.clear();
         Ok(self.estimate())
     }
@@ -159,7 +159,7 @@ impl PyTracker {
         let detections = borrowed.detections();
         let input = borrowed.frame(frame, &clouds, &images, &colors, &detections);
         let tracker = &mut self.tracker;
-        py.detach(|| tracker.step(&input).map(|_| ())).map_err(Raise::raise)?;
+        py.detach(|| tracker.step(&input).map(|_| ())).map_err(raise)?;
         self.sources.clone_from(&frame.sources);
         self.detector_failures += usize::from(self.tracker.detector_error().is_some());
         warn_of_detector(py, self.tracker.detector_error())?;
@@ -177,7 +177,7 @@ impl PyTracker {
         let views: Vec<_> = pictures.iter().map(|(pixels, size)| (pixels.view(py), *size)).collect();
         let pixels = views.iter().map(|(view, size)| Ok((view.pixels()?, *size))).collect::<PyResult<Vec<_>>>()?;
         let camera = number(&mut self.cameras, source);
-        self.tracker.set_background(camera, &pixels).map_err(Raise::raise)
+        self.tracker.set_background(camera, &pixels).map_err(raise)
     }
 
     /// Probability of each pixel of a frame's images to show the body at given poses: name of the camera -> (height, width).
@@ -225,7 +225,7 @@ impl PyTracker {
         let array = PointArray::new("points", points)?;
         let view = array.view(py);
         let slice = view.points()?;
-        let distances = py.detach(|| self.tracker.distance(slice)).map_err(Raise::raise)?;
+        let distances = py.detach(|| self.tracker.distance(slice)).map_err(raise)?;
         Ok(PyArray1::from_vec(py, distances))
     }
 
@@ -234,16 +234,16 @@ impl PyTracker {
         let array = PointArray::new("points", points)?;
         let view = array.view(py);
         let slice = view.points()?;
-        let distances = py.detach(|| self.tracker.limb_distances(slice)).map_err(Raise::raise)?;
+        let distances = py.detach(|| self.tracker.limb_distances(slice)).map_err(raise)?;
         Ok(PyArray2::from_vec2(py, &distances)?)
     }
 
     fn scale(&mut self, factor: f64) -> PyResult<()> {
-        self.tracker.scale(factor).map_err(Raise::raise)
+        self.tracker.scale(factor).map_err(raise)
     }
 
     fn set_shape(&mut self, limb: &str, shape: &PyShape) -> PyResult<()> {
-        self.tracker.set_shape(limb, shape.0).map_err(Raise::raise)
+        self.tracker.set_shape(limb, shape.0).map_err(raise)
     }
 
     fn _add_limb(
@@ -256,12 +256,12 @@ impl PyTracker {
         sites: Vec<(String, [f64; 3])>,
     ) -> PyResult<()> {
         let sites = sites.into_iter().map(|(name, position)| (name, Vec3::from_array(position))).collect();
-        self.tracker.add_limb(name, parent, shape.0, joint(parts), sites).map_err(Raise::raise)?;
+        self.tracker.add_limb(name, parent, shape.0, joint(parts), sites).map_err(raise)?;
         self.body_changed(py)
     }
 
     fn remove_limb(&mut self, py: Python<'_>, name: &str) -> PyResult<()> {
-        self.tracker.remove_limb(name).map_err(Raise::raise)?;
+        self.tracker.remove_limb(name).map_err(raise)?;
         self.body_changed(py)
     }
 
