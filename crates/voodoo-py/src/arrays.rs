@@ -146,6 +146,11 @@ pub(crate) fn rows<'a, const N: usize>(name: &str, array: &'a PyReadonlyArray2<'
     Err(MeasurementError::new_err(text))
 }
 
+/// Rows of vectors.
+pub(crate) fn vectors(name: &str, array: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Vec3>> {
+    Ok(rows(name, array)?.iter().map(|place| Vec3::from_array(*place)).collect())
+}
+
 /// The entries of a C-contiguous array of double precision with the given shape; `None` for anything else, including masked
 /// arrays.
 ///

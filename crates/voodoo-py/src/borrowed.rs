@@ -59,16 +59,21 @@ pub(crate) fn depth_images<'a>(views: &'a DepthViews) -> PyResult<Vec<DepthImage
     views.iter().map(image).collect()
 }
 
-/// A color image as one of the camera with this index.
-pub(crate) fn color_image<'a>((view, data): &'a (ColorView, &ColorData), number: u16) -> PyResult<ColorImage<'a>> {
-    let ColorData { ref camera, world_from_sensor, stamp, source, .. } = **data;
-    Ok(ColorImage { pixels: view.pixels()?, camera, world_from_sensor, stamp, number, source })
+/// The color images of these views, of the cameras with these indices.
+pub(crate) fn color_images<'a>(views: &'a ColorViews, cameras: &[u16]) -> PyResult<Vec<ColorImage<'a>>> {
+    let image = |((view, data), number): (&'a (ColorView, &ColorData), &u16)| {
+        let ColorData { ref camera, world_from_sensor, stamp, source, .. } = **data;
+        Ok(ColorImage { pixels: view.pixels()?, camera, world_from_sensor, stamp, number: *number, source })
+    };
+    views.iter().zip(cameras).map(image).collect()
 }
 
 /// Everything a step borrows: the views keep the arrays alive and readable.
 pub(crate) struct Borrowed<'py, 'a> {
+    held: &'a PyFrame,
     clouds: Vec<(PointView<'py>, Cloud<'static>)>,
-    pub(crate) images: DepthViews<'py, 'a>,
+    images: DepthViews<'py, 'a>,
+    colors: ColorViews<'py, 'a>,
     positions: Vec<PositionRelation>,
     rays: Vec<RayRelation>,
     detections: Vec<(Vec<PositionRelation>, f64)>,
@@ -94,36 +99,31 @@ impl<'py, 'a> Borrowed<'py, 'a> {
         let rays = frame.rays.iter().map(ray).collect::<PyResult<_>>()?;
         let clouds = frame.clouds.iter().map(cloud).collect::<PyResult<_>>()?;
         let detections = frame.detections.iter().map(person).collect::<PyResult<_>>()?;
-        Ok(Self { clouds, images: frame.depth_views(py), positions, rays, detections })
+        let (images, colors) = (frame.depth_views(py), frame.color_views(py));
+        Ok(Self { held: frame, clouds, images, colors, positions, rays, detections })
     }
 
-    pub(crate) fn clouds(&self) -> PyResult<Vec<Cloud<'_>>> {
+    fn clouds(&self) -> PyResult<Vec<Cloud<'_>>> {
         self.clouds.iter().map(|(view, cloud)| Ok(Cloud { points: view.points()?, ..*cloud })).collect()
     }
 
-    /// The detected persons.
-    pub(crate) fn detections(&self) -> Vec<DetectedPerson<'_>> {
-        self.detections.iter().map(|(positions, person)| DetectedPerson { positions, person: *person }).collect()
-    }
-
-    /// The frame of these views and of what was borrowed with them from `held`.
-    pub(crate) fn frame<'b>(
-        &'b self,
-        held: &'b PyFrame,
-        clouds: &'b [Cloud<'b>],
-        images: &'b [DepthImage<'b>],
-        colors: &'b [ColorImage<'b>],
-        detections: &'b [DetectedPerson<'b>],
-    ) -> Frame<'b> {
-        Frame::empty(held.stamp)
-            .with_clouds(clouds)
-            .with_images(images)
-            .with_colors(colors)
+    /// What a function makes of the frame, whose color images are of the cameras with these indices.
+    pub(crate) fn with_frame<T>(&self, cameras: &[u16], then: impl FnOnce(&Frame) -> PyResult<T>) -> PyResult<T> {
+        let (clouds, images, colors) =
+            (self.clouds()?, depth_images(&self.images)?, color_images(&self.colors, cameras)?);
+        let detections = self.detections.iter();
+        let detections: Vec<_> =
+            detections.map(|(positions, person)| DetectedPerson { positions, person: *person }).collect();
+        let frame = Frame::empty(self.held.stamp)
+            .with_clouds(&clouds)
+            .with_images(&images)
+            .with_colors(&colors)
             .with_positions(&self.positions)
             .with_rays(&self.rays)
-            .with_detections(detections)
-            .with_ground(held.ground)
-            .with_excluded(&held.excluded)
+            .with_detections(&detections)
+            .with_ground(self.held.ground)
+            .with_excluded(&self.held.excluded);
+        then(&frame)
     }
 }
 

@@ -50,9 +50,11 @@ fn shipped() -> Option<Box<dyn Detect>> {
     None
 }
 
-/// Reports that a detector failed in a step, which continued without it: a warning, or KeyboardInterrupt and the like unchanged.
-pub(crate) fn warn_of_detector(py: Python<'_>, error: Option<&DetectError>) -> PyResult<()> {
+/// Counts and reports that a detector failed in a step, which continued without it: a warning, or KeyboardInterrupt and the like
+/// unchanged.
+pub(crate) fn warn_of_detector(py: Python<'_>, error: Option<&DetectError>, failures: &mut usize) -> PyResult<()> {
     let Some(error) = error else { return Ok(()) };
+    *failures += 1;
     let cause = error.downcast_ref::<PyErr>();
     if let Some(cause) = cause.filter(|cause| !cause.is_instance_of::<PyException>(py)) {
         return Err(cause.clone_ref(py));

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use voodoo_core::RegionLine;
 use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::{Body, Frame, TrackError, Tracker};
-use voodoo_core::{ColorImage, RegionLine};
 
-use crate::arrays::{ColorArray, PointArray, limb_poses, rows, vector};
+use crate::arrays::{ColorArray, PointArray, limb_poses, vector, vectors};
 use crate::body::{JointParts, PyBody, joint};
-use crate::borrowed::{Borrowed, ColorData, ColorViews, color_image, depth_images, number};
+use crate::borrowed::{Borrowed, ColorData, color_images, number};
 use crate::config::config;
 use crate::detector::{detector, warn_of_detector};
 use crate::errors::{MeasurementError, raise, wrong_argument};
@@ -49,25 +49,22 @@ pub(crate) fn body_before<'py>(
     sites: PyReadonlyArray2<'py, f64>,
     camera: [f64; 3],
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let py = sites.py();
-    let places: Vec<Vec3> = rows("sites", &sites)?.iter().map(|place| Vec3::from_array(*place)).collect();
-    let found = tracker.tracker()?.body_before(&places, Vec3::from_array(camera));
-    Ok(PyArray1::from_vec(py, found.map_err(raise)?))
+    let found = tracker.tracker()?.body_before(&vectors("sites", &sites)?, Vec3::from_array(camera));
+    Ok(PyArray1::from_vec(sites.py(), found.map_err(raise)?))
 }
 
 impl PyTracker {
-    /// The color images of a frame, whose cameras are identified by name.
-    fn pictures<'a>(&mut self, frame: &PyFrame, views: &'a ColorViews) -> PyResult<Vec<ColorImage<'a>>> {
-        let mut colors = Vec::with_capacity(views.len());
-        for view in views {
-            let name = &frame.sources[usize::from(view.1.source)];
-            if view.1.camera.distorts() {
+    /// Indices of the cameras of a frame's color images; a camera is identified by its name.
+    fn cameras_of(&mut self, frame: &PyFrame) -> PyResult<Vec<u16>> {
+        let camera = |data: &ColorData| {
+            let name = &frame.sources[usize::from(data.source)];
+            if data.camera.distorts() {
                 let text = format!("color[{name}].camera: expected no distortion: undistort the picture, found some");
                 return Err(MeasurementError::new_err(text));
             }
-            colors.push(color_image(view, number(&mut self.cameras, name))?);
-        }
-        Ok(colors)
+            Ok(number(&mut self.cameras, name))
+        };
+        frame.colors.iter().map(camera).collect()
     }
 
     /// What the tracker makes of a frame's color images at given poses; releases the GIL.
@@ -79,8 +76,8 @@ impl PyTracker {
         question: impl FnOnce(&mut Tracker, &Frame, Option<&[Pose]>) -> Result<T, TrackError> + Send,
     ) -> PyResult<T> {
         let poses = poses.map(|poses| limb_poses(self.tracker.body(), &poses)).transpose()?;
-        let views = frame.color_views(py);
-        let colors = self.pictures(frame, &views)?;
+        let (cameras, views) = (self.cameras_of(frame)?, frame.color_views(py));
+        let colors = color_images(&views, &cameras)?;
         let input = Frame::empty(frame.stamp).with_colors(&colors);
         let tracker = &mut self.tracker;
         py.detach(|| question(tracker, &input, poses.as_deref())).map_err(raise)
@@ -153,16 +150,11 @@ impl PyTracker {
     /// Processes one frame; releases the GIL.
     fn step(&mut self, py: Python<'_>, frame: &PyFrame) -> PyResult<PyEstimate> {
         let borrowed = Borrowed::new(py, frame, self.tracker.body(), 0)?;
-        let (clouds, images) = (borrowed.clouds()?, depth_images(&borrowed.images)?);
-        let views = frame.color_views(py);
-        let colors = self.pictures(frame, &views)?;
-        let detections = borrowed.detections();
-        let input = borrowed.frame(frame, &clouds, &images, &colors, &detections);
+        let cameras = self.cameras_of(frame)?;
         let tracker = &mut self.tracker;
-        py.detach(|| tracker.step(&input).map(|_| ())).map_err(raise)?;
+        borrowed.with_frame(&cameras, |input| py.detach(|| tracker.step(input).map(|_| ())).map_err(raise))?;
         self.sources.clone_from(&frame.sources);
-        self.detector_failures += usize::from(self.tracker.detector_error().is_some());
-        warn_of_detector(py, self.tracker.detector_error())?;
+        warn_of_detector(py, self.tracker.detector_error(), &mut self.detector_failures)?;
         Ok(self.estimate())
     }
 
