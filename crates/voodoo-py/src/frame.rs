@@ -221,18 +221,16 @@ impl PyFrame {
         max_weight: f64,
         min_trust: f64,
     ) -> PyResult<usize> {
-        let weight = |sigma: f64| {
-            if sigma > 0.0 && sigma.is_finite() {
-                return Ok((reference_sigma / sigma).powi(2).min(max_weight));
-            }
-            Err(MeasurementError::new_err(format!("sigma: expected finite meters > 0, found {sigma}")))
-        };
-        let trusted = rays.iter().filter(|ray| ray.trust >= min_trust);
         let mut count = 0;
-        for ray in trusted {
-            let (site, source, origin, direction, bias) =
-                (ray.site.clone(), self.source(&ray.source), ray.origin.0, ray.direction.0, ray.bias);
-            let weight = |sigma: f64| Ok::<_, PyErr>(weight(sigma)? * ray.trust);
+        for ray in rays.iter().filter(|ray| ray.trust >= min_trust) {
+            let (site, source, bias) = (ray.site.clone(), self.source(&ray.source), ray.bias);
+            let (origin, direction) = (ray.origin.0, ray.direction.0);
+            let weight = |sigma: f64| {
+                if sigma > 0.0 && sigma.is_finite() {
+                    return Ok((reference_sigma / sigma).powi(2).min(max_weight) * ray.trust);
+                }
+                Err(MeasurementError::new_err(format!("sigma: expected finite meters > 0, found {sigma}")))
+            };
             if let Some(Row(position)) = ray.place {
                 let of = PositionRelation { site: 0, position, weight: weight(ray.place_sigma)?, bias, source };
                 self.positions.push((site.clone(), of));
