@@ -50,8 +50,8 @@ impl PyKeypointLayout {
         least: f64,
     ) -> PyResult<Option<usize>> {
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
-        let places = self.places(predicted)?.into_iter().map(|place| place.unwrap_or(Vec3::NAN));
-        let expected: Vec<_> = places.map(|place| eye.pixel(eye.in_sensor(place))).collect();
+        let places = places_of(predicted, self.0.iter().map(|part| &part.site))?.into_iter();
+        let expected: Vec<_> = places.map(|place| eye.pixel(eye.in_sensor(place.unwrap_or(Vec3::NAN)))).collect();
         let people = people.iter().map(|keypoints| rows("keypoints", keypoints)).collect::<PyResult<Vec<_>>>()?;
         Ok(nearest_person(people.into_iter(), &self.0, &expected, least))
     }
@@ -77,7 +77,7 @@ impl PyKeypointLayout {
     ) -> PyResult<Observed> {
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let (sensor, keypoints) = (Sensor { eye, source, noise, place_sigma, stamp }, rows("keypoints", &keypoints)?);
-        let (places, mut gate) = (self.places(predicted)?, gate);
+        let (places, mut gate) = (places_of(predicted, self.0.iter().map(|part| &part.site))?, gate);
         let (mut rays, mut points, mut unseen, mut dropped) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for (part, place) in self.0.iter().zip(places) {
             let Some(found) = part.pixel(keypoints, least) else {
@@ -96,8 +96,7 @@ impl PyKeypointLayout {
                 Some(before) => before.call_method1("get", (&part.site,))?.extract()?,
                 None => None,
             };
-            let flat = eye.undistorted(found.pixel);
-            let observation = SiteObservation { pixel: found, flat, expected, hidden: hidden.unwrap_or(0.0), surface };
+            let observation = SiteObservation { pixel: found, expected, hidden: hidden.unwrap_or(0.0), surface };
             match part.measurement(&observation, &sensor, gate.as_mut().map(|gate| &mut gate.0)) {
                 SiteMeasurement::Ray(direction, sigma) => rays.push(PySiteRay {
                     site: part.site.clone(),
@@ -115,13 +114,6 @@ impl PyKeypointLayout {
             }
         }
         Ok((rays, points, unseen, dropped))
-    }
-}
-
-impl PyKeypointLayout {
-    /// Predicted positions of the sites in a mapping of names to positions.
-    fn places(&self, places: &Bound<'_, PyAny>) -> PyResult<Vec<Option<Vec3>>> {
-        places_of(places, self.0.iter().map(|part| &*part.site))
     }
 }
 

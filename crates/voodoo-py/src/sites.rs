@@ -12,13 +12,13 @@ use crate::people::TrackedBody;
 /// Predicted positions of some sites, from a mapping of names to positions; `None` for missing ones.
 pub(crate) fn places_of<'a>(
     places: &Bound<'_, PyAny>,
-    sites: impl Iterator<Item = &'a str>,
+    sites: impl IntoIterator<Item = &'a String>,
 ) -> PyResult<Vec<Option<Vec3>>> {
-    let place = |site: &str| {
+    let place = |site: &String| {
         let place = places.call_method1("get", (site,))?;
         if place.is_none() { Ok(None) } else { vector(site, &place).map(Some) }
     };
-    sites.map(place).collect()
+    sites.into_iter().map(place).collect()
 }
 
 #[doc = stub!("expected_sites")]

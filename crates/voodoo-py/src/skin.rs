@@ -7,11 +7,10 @@ use pyo3::prelude::*;
 use voodoo_core::Camera;
 use voodoo_core::math::Vec3;
 use voodoo_sensors::eye::Eye;
-use voodoo_sensors::skin::colors::CHROMA_BINS;
 use voodoo_sensors::skin::cue::{Expected, SkinCue, SkinInput, SkinSettings};
 use voodoo_sensors::skin::depth::DepthBeside;
 
-use crate::arrays::{DepthArray, Row, rows};
+use crate::arrays::{DepthArray, Row, vectors};
 use crate::camera::{affine, camera_of};
 use crate::errors::{MeasurementError, raise, wrong_argument};
 use crate::people::TrackedBody;
@@ -30,10 +29,6 @@ fn colors_of<'a>(image: &'a PyReadonlyArray3<'_, u8>) -> PyResult<&'a [[u8; 3]]>
     Ok(image.as_slice()?.as_chunks().0)
 }
 
-fn vectors(name: &str, places: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Vec3>> {
-    Ok(rows(name, places)?.iter().map(|place| Vec3::from_array(*place)).collect())
-}
-
 #[doc = stub!("SkinCue")]
 #[pyclass(name = "SkinCue", module = "voodoo._core")]
 #[derive(Clone)]
@@ -41,8 +36,6 @@ pub struct PySkinCue {
     cue: SkinCue,
     /// Height and width of the last image.
     size: [usize; 2],
-    /// Of each site its name, and that of the elbow of its side.
-    names: Arc<Vec<[String; 2]>>,
 }
 
 #[pymethods]
@@ -50,10 +43,8 @@ impl PySkinCue {
     #[new]
     #[pyo3(signature = (sites, *, gate, growth, lost_gate, widest_gate))]
     fn new(sites: Vec<String>, gate: f64, growth: f64, lost_gate: f64, widest_gate: f64) -> Self {
-        let elbow = |site: &String| format!("{}_elbow", site.chars().take(1).collect::<String>());
-        let names = Arc::new(sites.iter().map(|site| [site.clone(), elbow(site)]).collect());
         let settings = SkinSettings { sites, gate, growth, lost_gate, widest_gate };
-        Self { cue: SkinCue::new(settings), size: [0; 2], names }
+        Self { cue: SkinCue::new(settings), size: [0; 2] }
     }
 
     fn __copy__(&self) -> Self {
@@ -63,11 +54,6 @@ impl PySkinCue {
     #[getter]
     fn learned(&self) -> u32 {
         self.cue.colors.learned
-    }
-
-    #[getter]
-    fn colors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        PyArray1::from_slice(py, &self.cue.colors.skin).reshape([CHROMA_BINS, CHROMA_BINS])
     }
 
     #[getter]
@@ -108,14 +94,15 @@ impl PySkinCue {
     ) -> PyResult<Vec<Ray>> {
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let mut expected = Vec::new();
-        for (site, names) in self.names.iter().enumerate() {
-            let places = places_of(predicted, names.iter().map(String::as_str))?;
+        for (site, name) in self.cue.settings.sites.iter().enumerate() {
+            let elbow = format!("{}_elbow", name.chars().take(1).collect::<String>());
+            let places = places_of(predicted, [name, &elbow])?;
             let [place, elbow] = [0, 1].map(|index| places[index].filter(|place| !place.is_nan()));
             expected.extend(place.map(|place| Expected { site, place, elbow }));
         }
         let names: Vec<String> =
             predicted.call_method0("keys")?.try_iter()?.map(|name| name?.extract()).collect::<PyResult<_>>()?;
-        let joints: Vec<Vec3> = places_of(predicted, names.iter().map(String::as_str))?.into_iter().flatten().collect();
+        let joints: Vec<Vec3> = places_of(predicted, &names)?.into_iter().flatten().collect();
         let depth = depth.map(|(image, per_unit, camera, pose)| {
             let expected = "an array of shape (height, width) and dtype uint16 or float32";
             let array = DepthArray::cast(&image).ok_or_else(|| wrong_argument("depth", expected, &image))?;
@@ -155,10 +142,7 @@ impl PySkinCue {
         #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
     ) -> PyResult<()> {
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
-        let (image, joints) = (colors_of(&image)?, vectors("joints", &joints)?);
-        let sites = vectors("sites", &sites)?;
-        let sites: Vec<Option<Vec3>> =
-            sites.into_iter().map(|place| Some(place).filter(|place| !place.is_nan())).collect();
+        let (image, joints, sites) = (colors_of(&image)?, vectors("joints", &joints)?, vectors("sites", &sites)?);
         let cue = &mut self.cue;
         py.detach(|| cue.learn(image, &eye, &joints, &sites)).map_err(raise)
     }

@@ -51,8 +51,6 @@ pub struct Sensor<'a> {
 pub struct SiteObservation {
     /// Its pixel and confidence.
     pub pixel: SitePixel,
-    /// The undistorted pixel `(x/z, y/z)`; NaN where it is not known.
-    pub flat: [f64; 2],
     /// Predicted position, world frame, meters.
     pub expected: Vec3,
     /// Length of the person's own body in front of the site, meters.
@@ -96,7 +94,7 @@ impl SiteKeypoints {
         mut gate: Option<&mut SiteGate>,
     ) -> SiteMeasurement {
         let (eye, expected) = (&sensor.eye, observation.expected);
-        let direction = eye.direction(observation.flat);
+        let direction = eye.direction(eye.undistorted(observation.pixel.pixel));
         let depth = eye.in_sensor(expected).z;
         let offset = expected - eye.origin();
         let away = (offset - offset.dot(direction).max(0.0) * direction).length();
@@ -187,8 +185,7 @@ mod tests {
         let eye = Eye { world_from_sensor: voodoo_core::math::Affine3::IDENTITY, camera: &camera };
         let sensor = Sensor { eye, source: "camera", noise: 3.0, place_sigma: 0.03, stamp: 0.0 };
         let pixel = SitePixel { pixel: [160.0, 120.0], confidence: 1.0 };
-        let observation =
-            SiteObservation { pixel, flat: [0.0; 2], expected: Vec3::new(0.05, 0.0, 2.0), hidden: 0.0, surface: None };
+        let observation = SiteObservation { pixel, expected: Vec3::new(0.05, 0.0, 2.0), hidden: 0.0, surface: None };
         let wrist = part(&[(0, 1.0)]);
         let mut gate = SiteGate::new(0.1, 0.0, 0.1);
         let sigma = |measured: SiteMeasurement| match measured {
@@ -212,7 +209,7 @@ mod tests {
         let far = SiteObservation { expected: Vec3::new(0.2, 0.0, 2.0), ..observation };
         assert_eq!(wrist.measurement(&far, &sensor, Some(&mut gate)), SiteMeasurement::Dropped);
         for wrong in [
-            SiteObservation { flat: [f64::NAN; 2], ..observation },
+            SiteObservation { pixel: SitePixel { pixel: [f64::NAN; 2], ..pixel }, ..observation },
             SiteObservation { expected: -Vec3::Z, ..observation },
         ] {
             assert_eq!(wrist.measurement(&wrong, &sensor, None), SiteMeasurement::Dropped);

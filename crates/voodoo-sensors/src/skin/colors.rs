@@ -1,7 +1,7 @@
 //! The color model of skin: two histograms of chroma, of skin and of what is around it, learned with a forgetting factor.
 
 /// Bins of either axis of chroma, Cr and Cb.
-pub const CHROMA_BINS: usize = 64;
+const CHROMA_BINS: usize = 64;
 const BINS: usize = CHROMA_BINS * CHROMA_BINS;
 /// Pixels with less luma have no reliable chroma.
 const DARKEST: i32 = 30;

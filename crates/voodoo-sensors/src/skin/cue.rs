@@ -367,23 +367,15 @@ impl SkinCue {
     }
 
     /// Learns the colors of the face and of what is around the body. `joints` are the positions of the body, and `sites` those of
-    /// head and hands, meters. The head must have been found, unless nothing was learned yet.
+    /// head and hands, meters, NaN where they are not known. The head must have been found, unless nothing was learned yet.
     ///
     /// # Errors
     /// [`TrackError::Measurement`] when the image is not of the camera's size.
-    pub fn learn(
-        &mut self,
-        image: &[[u8; 3]],
-        eye: &Eye,
-        joints: &[Vec3],
-        sites: &[Option<Vec3>],
-    ) -> Result<(), TrackError> {
+    pub fn learn(&mut self, image: &[[u8; 3]], eye: &Eye, joints: &[Vec3], sites: &[Vec3]) -> Result<(), TrackError> {
         eye.check("image", "a color for every pixel of the camera", image.len())?;
         let (mut faces, mut shown) = (Vec::new(), Vec::new());
-        for (site, place) in sites.iter().enumerate() {
-            let Some(inside) = place.map(|place| eye.in_sensor(place)).filter(|inside| inside.z > NEAREST) else {
-                continue;
-            };
+        let inside = sites.iter().map(|place| eye.in_sensor(*place)).enumerate();
+        for (site, inside) in inside.filter(|(_, inside)| inside.z > NEAREST) {
             let head = self.side(site).is_none();
             let (pixel, radius) = (eye.pixel(inside), if head { FACE } else { PALM } * eye.focal() / inside.z);
             shown.push((pixel, TAUGHT.1 * radius));
