@@ -2,7 +2,7 @@
 
 use crate::view::ThinnedImage;
 use nalgebra::{Matrix3, Vector3};
-use voodoo_core::math::{Vec3, widest};
+use voodoo_core::math::{Vec3, refill, reset, widest};
 
 /// Neighboring pixels are connected when their depths differ by less than this, meters, plus this fraction of the depth.
 const STEP: [f32; 2] = [0.04, 0.012];
@@ -143,10 +143,9 @@ pub(crate) struct Components {
 impl Components {
     /// Finds candidates for persons, those with the most probable sizes first.
     pub(crate) fn find(&mut self, view: &ThinnedImage, candidates: &mut Vec<PersonCandidate>) {
-        self.labels.clear();
-        self.labels.extend(view.depth.iter().enumerate().map(|(index, z)| if *z > 0.0 { index as u32 } else { NONE }));
-        self.again.clear();
-        self.again.resize(view.depth.len(), 1);
+        let label = |(index, z): (usize, &f32)| if *z > 0.0 { index as u32 } else { NONE };
+        refill(&mut self.labels, view.depth.iter().enumerate().map(label));
+        reset(&mut self.again, view.depth.len(), 1);
         let mut finer = 1.0;
         self.join(view, finer);
         self.measure(view);
@@ -167,9 +166,8 @@ impl Components {
     /// Splits components that are too large: connects their pixels again with smaller steps.
     fn cut(&mut self, view: &ThinnedImage, finer: f32) {
         let Self { labels, areas, again, .. } = self;
-        again.clear();
         let too_large = |label: &u32| *label != NONE && f64::from(areas[*label as usize]) > AREA[1];
-        again.extend(labels.iter().map(|label| u8::from(too_large(label))));
+        refill(again, labels.iter().map(|label| u8::from(too_large(label))));
         for ((label, again), index) in labels.iter_mut().zip(again).zip(0..) {
             if *again > 0 {
                 *label = index;
@@ -222,8 +220,7 @@ impl Components {
     fn link(&mut self, view: &ThinnedImage, finer: f32) {
         let Self { linked, needed, again, .. } = self;
         let width = view.width;
-        linked.clear();
-        linked.resize(view.depth.len(), 0);
+        reset(linked, view.depth.len(), 0);
         needed.clear();
         widest(
             #[inline(always)]

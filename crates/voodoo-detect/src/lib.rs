@@ -181,7 +181,7 @@ impl Detect for Detector {
             let Some(mut detection) = evaluate(enlargement(stature.map(|[stature, _]| stature))) else { continue };
             evaluations += 1;
             if nearest.is_none() {
-                *nearest = Some((detection.person, in_world(candidate, &image.world_from_sensor)));
+                *nearest = Some((detection.person, Aabb::new(detection.low, detection.high)));
             }
             if detection.person > PERSON {
                 let enlarged = enlargement(detection.lengths.last().map(|[length, _]| *length));
@@ -231,11 +231,6 @@ impl Detect for Detector {
             self.rejections.record(candidate, false);
         }
     }
-}
-
-/// World-frame box around a candidate's box.
-fn in_world(candidate: &PersonCandidate, world_from_camera: &Pose) -> Aabb {
-    Aabb::from_points(Aabb::new(candidate.low, candidate.high).corners().map(|corner| *world_from_camera * corner))
 }
 
 /// Factor by which a person of this stature is enlarged in the network's input; 1 where the stature is not known.
@@ -300,7 +295,8 @@ fn detection(answer: &Answer, crop: &Crop, candidate: &PersonCandidate, world_fr
     let length = |(length, scale): (&f32, &f32)| {
         [f64::from(*length).exp() / crop.enlarged, SIGMA_BY_SCALE * f64::from(*scale).exp()]
     };
-    let bounds = in_world(candidate, world_from_camera);
+    let corners = Aabb::new(candidate.low, candidate.high).corners();
+    let bounds = Aabb::from_points(corners.map(|corner| *world_from_camera * corner));
     Detection {
         joints,
         lengths: answer.log_lengths.iter().zip(&answer.log_length_scale).map(length).collect(),
