@@ -50,13 +50,12 @@ struct Component {
 
 impl Component {
     fn new(label: u32, area: f64) -> Self {
-        let samples = [Vec3::ZERO; COMPONENT_SAMPLES];
         Self {
             label,
             area,
             low: Vec3::INFINITY,
             high: Vec3::NEG_INFINITY,
-            samples,
+            samples: [Vec3::ZERO; COMPONENT_SAMPLES],
             sampled: 0,
             added: 0,
             every: 1,

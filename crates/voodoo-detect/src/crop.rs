@@ -101,7 +101,8 @@ mod tests {
             let image = DepthImage { world_from_sensor, ..image(&pixels) };
             let mut segmentation = Segmentation::default();
             let around = Surroundings { up: Some(-Vec3::Y), ..Surroundings::default() };
-            let candidate = segmentation.find(&image, &around)[0].clone();
+            segmentation.find(&image, &around);
+            let candidate = segmentation.candidates[0].clone();
             let crop = segmentation.crop(&candidate, enlarged).unwrap();
             assert!((crop.roll - roll).abs() < 1e-9, "{}", crop.roll);
             // Every pixel on the person, transformed back to the camera frame, coincides with a measured point.

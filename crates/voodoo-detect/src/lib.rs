@@ -112,8 +112,8 @@ impl Detector {
 
     /// Indices of the last image's candidates that the query evaluates, in order of evaluation.
     fn order(&self, query: DetectionQuery, camera_from_world: &Pose) -> Vec<usize> {
-        let mut order: Vec<usize> = (0..self.segmentation.candidates().len()).collect();
-        let at = |number: usize| &self.segmentation.candidates()[number];
+        let mut order: Vec<usize> = (0..self.segmentation.candidates.len()).collect();
+        let at = |number: usize| &self.segmentation.candidates[number];
         match query {
             DetectionQuery::All => {}
             DetectionQuery::Any => order.sort_by_key(|number| self.rejections.last_rejection(at(*number))),
@@ -172,7 +172,7 @@ impl Detect for Detector {
         let mut found: Vec<(usize, Detection)> = Vec::new();
         let mut evaluations = 0;
         for number in order {
-            let candidate = &segmentation.candidates()[number];
+            let candidate = &segmentation.candidates[number];
             let mut evaluate = |enlarged: f64| {
                 let crop = segmentation.crop(candidate, enlarged)?;
                 let answer = network.evaluate(&crop.pixels, memory);
@@ -202,15 +202,15 @@ impl Detect for Detector {
             }
         }
         found.sort_by(|(_, a), (_, b)| b.person.total_cmp(&a.person));
-        let floor = segmentation.floor().map(|floor| {
+        let floor = segmentation.floor.map(|floor| {
             let normal = image.world_from_sensor.rotation * floor.normal;
             Ground { normal, offset: floor.offset + normal.dot(image.world_from_sensor.translation) }
         });
         let mut kept = Vec::new();
         for (number, mut detection) in found {
-            let candidate = &segmentation.candidates()[number];
+            let candidate = &segmentation.candidates[number];
             // Of candidates that share components only the most confident is kept.
-            if numbers.iter().any(|other| segmentation.candidates()[*other].overlaps(candidate)) {
+            if numbers.iter().any(|other| segmentation.candidates[*other].overlaps(candidate)) {
                 continue;
             }
             detection.floor = floor;
@@ -227,7 +227,7 @@ impl Detect for Detector {
 
     fn reject(&mut self, index: usize) {
         let number = self.found.get(index);
-        if let Some(candidate) = number.and_then(|number| self.segmentation.candidates().get(*number)) {
+        if let Some(candidate) = number.and_then(|number| self.segmentation.candidates.get(*number)) {
             self.rejections.record(candidate, false);
         }
     }

@@ -99,11 +99,8 @@ pub struct Network {
     middle: Residual,
     head: Convolution,
     hidden: Panels,
-    visible: Panels,
-    facing: Panels,
-    person: Panels,
-    /// Scale of each joint's error, lengths, and scales of their errors.
-    sizes: [Panels; 3],
+    /// Whether each joint is visible, facing, person, scale of each joint's error, lengths, and scales of their errors.
+    overall: [Panels; 6],
 }
 
 impl std::fmt::Debug for Network {
@@ -144,8 +141,8 @@ impl Network {
             (overall("visible", joints)?, overall("facing", Some(1))?, overall("person", Some(1))?);
         let length = overall("length", None)?;
         let length_scale = overall("length_scale", Some(length.outputs))?;
-        let sizes = [overall("scale", joints)?, length, length_scale];
-        Ok(Self { stages, top, middle, head, hidden, visible, facing, person, sizes })
+        let overall = [visible, facing, person, overall("scale", joints)?, length, length_scale];
+        Ok(Self { stages, top, middle, head, hidden, overall })
     }
 
     /// Number of joints that it reports.
@@ -182,16 +179,10 @@ impl Network {
     fn overall(&self, pooled: &[f32]) -> Answer {
         let mut values = product(&self.hidden, pooled);
         rectify(&mut values);
-        let [log_scale, log_lengths, log_length_scale] = self.sizes.each_ref().map(|layer| product(layer, &values));
-        Answer {
-            joints: Vec::new(),
-            log_scale,
-            visible: product(&self.visible, &values),
-            facing: product(&self.facing, &values)[0],
-            person: product(&self.person, &values)[0],
-            log_lengths,
-            log_length_scale,
-        }
+        let [visible, facing, person, log_scale, log_lengths, log_length_scale] =
+            self.overall.each_ref().map(|layer| product(layer, &values));
+        let (facing, person) = (facing[0], person[0]);
+        Answer { joints: Vec::new(), log_scale, visible, facing, person, log_lengths, log_length_scale }
     }
 }
 

@@ -210,7 +210,7 @@ pub(crate) fn person_candidates<'py>(
     let mut segmentation = Segmentation::default();
     segmentation.find(&image, &around);
     let (mut found, mut pixels) = (Vec::new(), Vec::new());
-    for candidate in segmentation.candidates().iter().take(most) {
+    for candidate in segmentation.candidates.iter().take(most) {
         let Some(crop) = segmentation.crop(candidate, enlarged) else { continue };
         segmentation.mask(candidate, &mut pixels);
         let channels: Vec<f32> = (0..2).flat_map(|c| crop.pixels.iter().map(move |pixel| pixel[c])).collect();
@@ -220,7 +220,7 @@ pub(crate) fn person_candidates<'py>(
             middle: crop.middle,
             roll: crop.roll,
             area: candidate.area,
-            floor: segmentation.floor().map(|floor| (floor.normal.to_array(), floor.offset)),
+            floor: segmentation.floor.map(|floor| (floor.normal.to_array(), floor.offset)),
         });
     }
     Ok(found)
