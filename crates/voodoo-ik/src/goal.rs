@@ -20,12 +20,6 @@ pub enum Aim {
 }
 
 impl Aim {
-    /// The line through `origin` along `direction` (any length but zero).
-    pub fn line(origin: Vec3, direction: Vec3) -> Self {
-        let n = direction.normalize_or_zero();
-        Self::Line { n, m: origin.cross(n) }
-    }
-
     /// The residual of a point at `x`: its offset from the position, or `x x n - m` (R07 eq. 11), whose length is its distance
     /// from the line.
     pub fn residual(&self, x: Vec3) -> Vec3 {
