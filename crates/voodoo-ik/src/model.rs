@@ -102,40 +102,32 @@ impl ChainModel {
         }
         let free = [f64::NEG_INFINITY, f64::INFINITY];
         let first = self.links.is_empty();
-        let mut link = Link {
-            limb,
-            parent,
-            parent_from_joint: Pose::IDENTITY,
-            joint_from_limb: Pose::IDENTITY,
-            turn: Turn::Rigid,
-            start,
-        };
-        match joint {
+        let (mut parent_from_joint, mut joint_from_limb) = (Pose::IDENTITY, Pose::IDENTITY);
+        let turn = match joint {
             _ if first && root == Root::Free => {
-                link.turn = Turn::Free;
                 self.names.extend(["x", "y", "z", "rx", "ry", "rz"].map(|axis| format!("root_{axis}")));
                 self.limits.extend([free; 6]);
+                Turn::Free
             }
-            None => {}
+            None => Turn::Rigid,
             Some((_, joint)) => {
-                link.parent_from_joint = joint.parent_from_joint;
-                link.joint_from_limb = joint.limb_from_joint.inverse();
+                (parent_from_joint, joint_from_limb) = (joint.parent_from_joint, joint.limb_from_joint.inverse());
                 if joint.kind() == JointKind::Hinge {
                     let axis = hinge_axis(joint);
-                    link.turn = Turn::Hinge(axis);
                     self.names.push(format!("{}_flexion", joint.name));
                     self.limits.push(joint.limits.map_or(free, |limits| limits[usize::from(axis == Vec3::Y)]));
+                    Turn::Hinge(axis)
                 } else {
-                    link.turn = Turn::Ball;
                     self.names.extend(["rx", "ry", "rz"].map(|axis| format!("{}_{axis}", joint.name)));
                     self.limits.extend(joint.limits.unwrap_or([free; 3]));
+                    Turn::Ball
                 }
             }
-        }
+        };
         let mut movers = parent.map_or_else(Vec::new, |parent| self.movers[parent].clone());
         movers.extend(start..self.names.len());
         self.movers.push(movers);
-        self.links.push(link);
+        self.links.push(Link { limb, parent, parent_from_joint, joint_from_limb, turn, start });
         Ok(())
     }
 
