@@ -60,11 +60,7 @@ impl IkSolver {
             (0..n).map(|i| step[i] - from.map_or(0.0, |from| self.stages[from * n + i])).map(|d| d * d).sum()
         };
         for level in 0..active.levels.min(stage + 1) {
-            let rise = match level {
-                0 if stage == 0 => 0.0,
-                0 => length(Some(0)),
-                _ => length(None),
-            };
+            let rise = length((level == 0).then_some(0));
             let limit = match self.levels.best.get(level) {
                 Some(best) if !active.slack => (best + 0.1 * SETTLED).max(self.levels.before[level]),
                 _ => self.levels.before[level] + rise + 1e-13,
@@ -87,7 +83,7 @@ impl IkSolver {
     fn take_trial(&mut self, angles: &mut [f64]) -> f64 {
         let moved = angles.iter().zip(&self.trial_angles).fold(0.0_f64, |most, (old, new)| most.max((old - new).abs()));
         angles.copy_from_slice(&self.trial_angles);
-        self.accept();
+        std::mem::swap(&mut self.here, &mut self.trial);
         moved
     }
 }
