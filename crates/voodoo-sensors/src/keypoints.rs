@@ -96,8 +96,7 @@ impl SiteKeypoints {
         let (eye, expected) = (&sensor.eye, observation.expected);
         let direction = eye.direction(eye.undistorted(observation.pixel.pixel));
         let depth = eye.in_sensor(expected).z;
-        let offset = expected - eye.origin();
-        let away = (offset - offset.dot(direction).max(0.0) * direction).length();
+        let away = eye.distance_from_ray(expected, direction);
         if !(depth > 0.0 && away >= 0.0) {
             return SiteMeasurement::Dropped;
         }
@@ -129,22 +128,19 @@ pub fn nearest_person<'a>(
     expected: &[[f64; 2]],
     least: f64,
 ) -> Option<usize> {
-    let mut best: Option<(usize, f64)> = None;
-    for (number, keypoints) in people.enumerate() {
+    let middle = |(number, keypoints): (usize, &[[f64; 3]])| {
         let apart = |(part, place): (&SiteKeypoints, &[f64; 2])| {
             let [u, v] = part.pixel(keypoints, least)?.pixel;
             Some((u - place[0]).hypot(v - place[1])).filter(|distance| distance.is_finite())
         };
         let mut distances: Vec<f64> = layout.iter().zip(expected).filter_map(apart).collect();
         distances.sort_unstable_by(f64::total_cmp);
-        let Some(upper) = distances.get(distances.len() / 2) else { continue };
-        let lower = distances.get((distances.len() - 1) / 2).unwrap_or(upper);
-        let middle = 0.5 * (lower + upper);
-        if best.is_none_or(|(_, least)| middle < least) {
-            best = Some((number, middle));
-        }
-    }
-    best.map(|(number, _)| number)
+        let upper = distances.get(distances.len() / 2)?;
+        let lower = distances.get((distances.len() - 1) / 2)?;
+        Some((number, 0.5 * (lower + upper)))
+    };
+    let nearest = people.enumerate().filter_map(middle).min_by(|a, b| a.1.total_cmp(&b.1));
+    nearest.map(|(number, _)| number)
 }
 
 #[cfg(test)]

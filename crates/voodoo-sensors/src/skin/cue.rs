@@ -48,7 +48,7 @@ const KEPT: (f64, f64) = (0.25, 0.35);
 const NEAREST: f64 = 0.1;
 
 /// Parameters that turn skin regions into rays.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct SkinSettings {
     /// Names of the sites; those of hands start with `l_` or `r_`.
     pub sites: Vec<String>,
@@ -136,7 +136,7 @@ struct Trace {
 type Window = [Range<usize>; 2];
 
 /// The state of the skin cue of one camera.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct SkinCue {
     /// Parameters.
     pub settings: SkinSettings,
@@ -157,15 +157,7 @@ impl SkinCue {
     /// Returns a cue without any image.
     pub fn new(settings: SkinSettings) -> Self {
         let count = settings.sites.len();
-        Self {
-            settings,
-            colors: SkinColors::default(),
-            mask: ([0..0, 0..0], Vec::new()),
-            candidates: Vec::new(),
-            assigned: Vec::new(),
-            traces: vec![None; count],
-            missed: vec![None; count],
-        }
+        Self { settings, traces: vec![None; count], missed: vec![None; count], ..Self::default() }
     }
 
     fn side(&self, site: usize) -> Option<Side> {
@@ -261,12 +253,11 @@ impl SkinCue {
                 continue;
             }
             for site in sites {
-                let Some(elbow) = site.elbow.filter(|_| self.side(site.site).is_some()) else {
-                    if self.side(site.site).is_none() {
-                        add(Some(site.site), middle);
-                    }
+                if self.side(site.site).is_none() {
+                    add(Some(site.site), middle);
                     continue;
-                };
+                }
+                let Some(elbow) = site.elbow else { continue };
                 let elbow = input.eye.pixel(input.eye.in_sensor(elbow));
                 let farther = |a: &&usize, b: &&usize| apart(at(**a), elbow).total_cmp(&apart(at(**b), elbow));
                 if let Some(end) = members.iter().max_by(farther).filter(|_| elbow[0].is_finite()) {
@@ -329,10 +320,7 @@ impl SkinCue {
     fn distance(&self, site: &Expected, candidate: &SkinCandidate, input: &SkinInput, gate: f64) -> Option<f64> {
         let from = |target: Vec3| match self.inside(site.site, candidate) {
             Some(place) => place.distance(target),
-            None => {
-                let offset = target - input.eye.origin();
-                (offset - offset.dot(candidate.direction).max(0.0) * candidate.direction).length()
-            }
+            None => input.eye.distance_from_ray(target, candidate.direction),
         };
         let distance = from(site.place);
         let kept = self.traces[site.site].filter(|_| input.depth.is_some()).and_then(|trace| {
