@@ -31,8 +31,6 @@ pub struct SkinColors {
     /// Number of images that were learned from.
     pub learned: u32,
     rest: Vec<f32>,
-    is_skin: Vec<bool>,
-    is_near: Vec<bool>,
 }
 
 /// Bin of a color (blue, green, red) by chroma as in ITU-R BT.601; `None` if it is dark.
@@ -55,27 +53,24 @@ impl Default for SkinColors {
         };
         let mut skin: Vec<f32> = (0..BINS).map(bell).collect();
         normalize(&mut skin);
-        let (rest, learned) = (vec![1.0 / BINS as f32; BINS], 0);
-        let mut colors = Self { skin, learned, rest, is_skin: Vec::new(), is_near: Vec::new() };
-        colors.judge();
-        colors
+        Self { skin, learned: 0, rest: vec![1.0 / BINS as f32; BINS] }
     }
 }
 
 impl SkinColors {
-    fn judge(&mut self) {
-        let above = |ratio: f32| self.skin.iter().zip(&self.rest).map(|(skin, rest)| *skin > ratio * rest).collect();
-        (self.is_skin, self.is_near) = (above(RATIO), above(NEAR_RATIO));
+    /// Whether skin is so many times as likely as its surroundings to have the colors of a bin.
+    fn is_above(&self, bin: usize, ratio: f32) -> bool {
+        self.skin[bin] > ratio * self.rest[bin]
     }
 
     /// Whether a color (blue, green, red) is that of skin.
     pub(super) fn contains(&self, color: [u8; 3]) -> bool {
-        bin(color).is_some_and(|bin| self.is_skin[bin])
+        bin(color).is_some_and(|bin| self.is_above(bin, RATIO))
     }
 
     /// Learns from the pixels of a face, of which those near the colors of skin count, and from those that show no skin.
     pub(super) fn learn(&mut self, face: impl Iterator<Item = [u8; 3]>, rest: impl Iterator<Item = [u8; 3]>) {
-        let near = |index: &usize| self.is_near[*index];
+        let near = |bin: &usize| self.is_above(*bin, NEAR_RATIO);
         let Some(skin) = histogram(face.filter_map(bin).filter(near)) else { return };
         let Some(rest) = histogram(rest.filter_map(bin)) else { return };
         let keep = if self.learned < FIRST_IMAGES { FORGETTING_AT_FIRST } else { FORGETTING };
@@ -84,7 +79,6 @@ impl SkinColors {
         let unseen = UNSEEN / BINS as f32;
         self.rest.iter_mut().zip(rest).for_each(|(old, new)| mixed(old, (1.0 - UNSEEN) * new + unseen));
         self.learned += 1;
-        self.judge();
     }
 }
 
