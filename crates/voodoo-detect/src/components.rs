@@ -34,14 +34,14 @@ const LEFT_BY_TWO: u8 = 4;
 const UP_BY_TWO: u8 = 8;
 
 /// A connected component; camera frame, meters.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Component {
     label: u32,
     area: f64,
     low: Vec3,
     high: Vec3,
-    samples: [Vec3; COMPONENT_SAMPLES],
-    sampled: usize,
+    /// At most [`COMPONENT_SAMPLES`] of its points.
+    samples: Vec<Vec3>,
     /// Number of points added so far; every `every`-th of them was kept.
     added: usize,
     every: usize,
@@ -55,8 +55,7 @@ impl Component {
             area,
             low: Vec3::INFINITY,
             high: Vec3::NEG_INFINITY,
-            samples: [Vec3::ZERO; COMPONENT_SAMPLES],
-            sampled: 0,
+            samples: Vec::with_capacity(COMPONENT_SAMPLES),
             added: 0,
             every: 1,
             flat: false,
@@ -69,15 +68,12 @@ impl Component {
         self.high = self.high.max(point);
         // `every` is a power of two, which avoids a division per pixel.
         if self.added & (self.every - 1) == 0 {
-            if self.sampled == COMPONENT_SAMPLES {
+            if self.samples.len() == COMPONENT_SAMPLES {
                 // Drops every second kept point to make room.
-                for number in 0..COMPONENT_SAMPLES / 2 {
-                    self.samples[number] = self.samples[2 * number];
-                }
-                (self.sampled, self.every) = (COMPONENT_SAMPLES / 2, 2 * self.every);
+                self.samples = self.samples.iter().step_by(2).copied().collect();
+                self.every *= 2;
             }
-            self.samples[self.sampled] = point;
-            self.sampled += 1;
+            self.samples.push(point);
         }
         self.added += 1;
     }
@@ -323,7 +319,7 @@ impl Components {
             }
         }
         for part in parts.iter_mut() {
-            part.flat = is_flat(&part.samples[..part.sampled], (part.high - part.low).max_element());
+            part.flat = is_flat(&part.samples, (part.high - part.low).max_element());
         }
     }
 
@@ -379,8 +375,7 @@ fn near(a: &Component, b: &Component) -> bool {
     if gap > GAP {
         return false;
     }
-    let others = &b.samples[..b.sampled];
-    a.samples[..a.sampled].iter().any(|p| others.iter().any(|q| p.distance_squared(*q) < GAP * GAP))
+    a.samples.iter().any(|p| b.samples.iter().any(|q| p.distance_squared(*q) < GAP * GAP))
 }
 
 /// Whether points, whose box has this longest edge, lie near a plane.
