@@ -7,7 +7,7 @@ use voodoo_core::math::Pose;
 use voodoo_core::{Body, Camera};
 use voodoo_core::{Cloud, ColorImage, DepthImage, DetectedPerson, Frame, PositionRelation, RayRelation, Scope};
 
-use crate::arrays::{ColorArray, ColorView, DepthArray, DepthView, PointArray, PointView};
+use crate::arrays::{ColorView, DepthView, PointView};
 use crate::errors::raise;
 use crate::frame::PyFrame;
 
@@ -21,15 +21,16 @@ pub(crate) fn number(names: &mut Vec<String>, name: &str) -> u16 {
     number as u16
 }
 
-/// A cloud, whose points are in the array, and the name of the limb that they are on.
-pub(crate) type CloudData = (PointArray, Cloud<'static>, Option<String>);
+/// A cloud, whose points are those of a [`PointView`] of the array, and the name of the limb that they are on.
+pub(crate) type CloudData = (Py<PyAny>, Cloud<'static>, Option<String>);
 /// A measured position, and the name of its site, whose index is not known yet.
 pub(crate) type PositionData = (String, PositionRelation);
 /// A ray, and the name of its site, whose index is not known yet.
 pub(crate) type RayData = (String, RayRelation);
 
 pub(crate) struct ImageData {
-    pub pixels: DepthArray,
+    /// An array for a [`DepthView`].
+    pub pixels: Py<PyAny>,
     pub camera: Arc<Camera>,
     pub meters_per_unit: f64,
     pub world_from_sensor: Pose,
@@ -38,7 +39,8 @@ pub(crate) struct ImageData {
 }
 
 pub(crate) struct ColorData {
-    pub pixels: ColorArray,
+    /// An array for a [`ColorView`].
+    pub pixels: Py<PyAny>,
     pub camera: Arc<Camera>,
     pub world_from_sensor: Pose,
     pub stamp: f64,
@@ -87,7 +89,7 @@ impl<'py, 'a> Borrowed<'py, 'a> {
         let cloud = |(points, cloud, limb): &'a CloudData| {
             let limb = limb.as_ref().map(|name| body.limb_index(name)).transpose().map_err(raise)?;
             let (scope, source) = (limb.map_or(cloud.scope, Scope::Limb), cloud.source + first);
-            Ok((points.view(py), Cloud { scope, source, ..*cloud }))
+            Ok((points.extract(py)?, Cloud { scope, source, ..*cloud }))
         };
         let position =
             |(name, of): &PositionData| Ok(PositionRelation { site: index(name)?, source: of.source + first, ..*of });
@@ -99,7 +101,7 @@ impl<'py, 'a> Borrowed<'py, 'a> {
         let rays = frame.rays.iter().map(ray).collect::<PyResult<_>>()?;
         let clouds = frame.clouds.iter().map(cloud).collect::<PyResult<_>>()?;
         let detections = frame.detections.iter().map(person).collect::<PyResult<_>>()?;
-        let (images, colors) = (frame.depth_views(py), frame.color_views(py));
+        let (images, colors) = (frame.depth_views(py)?, frame.color_views(py)?);
         Ok(Self { held: frame, clouds, images, colors, positions, rays, detections })
     }
 

@@ -45,7 +45,7 @@ impl PyDetector {
     #[pyo3(signature = (frame, *, up=None))]
     fn detect(&mut self, py: Python<'_>, frame: &PyFrame, up: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<PyDetection>> {
         let any = Body::human(1.75, HumanModel::Full).map_err(raise)?;
-        let views = frame.depth_views(py);
+        let views = frame.depth_views(py)?;
         let images = depth_images(&views)?;
         let input =
             Frame::empty(frame.stamp).with_images(&images).with_ground(frame.ground).with_excluded(&frame.excluded);

@@ -10,7 +10,7 @@ use voodoo_core::math::Aabb;
 use voodoo_core::{Cloud, Ground, PointSlice, PositionRelation, RayRelation, Scope};
 
 use crate::arguments;
-use crate::arrays::{ColorArray, DepthArray, PointArray, Row, pose, unmasked, vector};
+use crate::arrays::{DepthView, Row, picture, points, pose, unmasked, vector, viewable};
 use crate::borrowed::{CloudData, ColorData, ColorViews, DepthViews, ImageData, PositionData, RayData, number};
 use crate::camera::camera_of;
 use crate::errors::{MeasurementError, wrong_argument};
@@ -37,13 +37,13 @@ pub struct PyFrame {
 
 impl PyFrame {
     /// Borrows the depth images.
-    pub(crate) fn depth_views<'py>(&self, py: Python<'py>) -> DepthViews<'py, '_> {
-        self.images.iter().map(|data| (data.pixels.view(py), data)).collect()
+    pub(crate) fn depth_views<'py>(&self, py: Python<'py>) -> PyResult<DepthViews<'py, '_>> {
+        self.images.iter().map(|data| Ok((data.pixels.extract(py)?, data))).collect()
     }
 
     /// Borrows the color images.
-    pub(crate) fn color_views<'py>(&self, py: Python<'py>) -> ColorViews<'py, '_> {
-        self.colors.iter().map(|data| (data.pixels.view(py), data)).collect()
+    pub(crate) fn color_views<'py>(&self, py: Python<'py>) -> PyResult<ColorViews<'py, '_>> {
+        self.colors.iter().map(|data| Ok((data.pixels.extract(py)?, data))).collect()
     }
 
     fn source(&mut self, name: &str) -> u16 {
@@ -70,7 +70,7 @@ impl PyFrame {
         on_body: bool,
         source: &str,
     ) -> PyResult<()> {
-        let array = PointArray::new("points", points)?;
+        let array = self::points("points", points)?.unbind();
         let cloud = Cloud {
             points: PointSlice::F32(&[]),
             world_from_sensor: pose("world_from_sensor", world_from_sensor)?,
@@ -98,7 +98,7 @@ impl PyFrame {
         let wrong = |found: &Bound<'_, PyAny>| wrong_argument("image", expected, found);
         let array = image.cast::<PyUntypedArray>().map_err(|_| wrong(&image.get_type()))?;
         unmasked("image", image, "fill it with 0, which is no return: image.filled(0)")?;
-        let pixels = DepthArray::cast(image).ok_or_else(|| wrong(image))?;
+        let pixels = viewable::<DepthView>(image).ok_or_else(|| wrong(image))?.unbind();
         if array.shape() != [height, width] {
             let text = format!(
                 "image: expected {height} rows of {width} pixels, as its camera has, found shape {:?}",
@@ -131,11 +131,11 @@ impl PyFrame {
         let [height, width] = [camera.height(), camera.width()];
         let expected = format!("an array of shape ({height}, {width}, 3) or ({height}, {width}) and dtype uint8");
         unmasked("image", image, "fill it: image.filled(0)")?;
-        let (pixels, _) = ColorArray::new(image)
+        let (pixels, _) = picture(image)
             .filter(|(_, found)| *found == [height, width])
             .ok_or_else(|| wrong_argument("image", &expected, image))?;
         let data = ColorData {
-            pixels,
+            pixels: pixels.unbind(),
             camera,
             world_from_sensor: pose("world_from_sensor", world_from_sensor)?,
             stamp: stamp.map_or(Ok(self.stamp), arguments::stamp)?,

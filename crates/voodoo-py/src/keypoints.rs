@@ -9,7 +9,7 @@ use voodoo_core::math::Vec3;
 use voodoo_sensors::eye::Eye;
 use voodoo_sensors::keypoints::{Sensor, SiteKeypoints, SiteMeasurement, SiteObservation, nearest_person};
 
-use crate::arrays::{PointArray, Row, rows};
+use crate::arrays::{PointView, Row, points, rows};
 use crate::camera::{affine, camera_of};
 use crate::errors::raise;
 use crate::people::TrackedBody;
@@ -135,8 +135,7 @@ pub(crate) fn carried<'py>(
     world_from_sensor: Option<PyReadonlyArray2<'py, f64>>,
 ) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
     let pose = world_from_sensor.as_ref().map(|pose| affine("world_from_sensor", pose)).transpose()?;
-    let array = PointArray::new("points", points)?;
-    let view = array.view(py);
+    let view: PointView = self::points("points", points)?.extract()?;
     let moved = voodoo_sensors::carried::carried(view.points()?, tracker.tracker()?, elapsed, pose.as_ref());
     let moved = moved.map_err(raise)?;
     let array =

@@ -6,7 +6,7 @@ use voodoo_core::math::{Points, Pose};
 use voodoo_core::{SurfaceBatch, TaperedEllipticCylinder};
 
 use crate::arguments;
-use crate::arrays::{PointArray, Row, vector};
+use crate::arrays::{PointView, Row, points, vector};
 use crate::errors::{BodyError, MeasurementError, wrong_argument};
 
 #[doc = stub!("TaperedEllipticCylinder")]
@@ -80,8 +80,7 @@ impl PyShape {
 
     #[doc = stub!("TaperedEllipticCylinder.closest_points")]
     fn closest_points(&self, py: Python<'_>, points: &Bound<'_, PyAny>) -> PyResult<PyClosestPoints> {
-        let array = PointArray::new("points", points)?;
-        let view = array.view(py);
+        let view: PointView = self::points("points", points)?.extract()?;
         let slice = view.points()?;
         if let Some(row) = (0..slice.len()).rfind(|row| !slice.get(*row).is_finite()) {
             let found = format!("points: expected finite meters, found {:?} in row {row}", slice.get(row).to_array());

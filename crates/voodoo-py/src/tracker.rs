@@ -9,7 +9,7 @@ use voodoo_core::RegionLine;
 use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::{Body, Frame, TrackError, Tracker};
 
-use crate::arrays::{ColorArray, PointArray, limb_poses, vector, vectors};
+use crate::arrays::{ColorView, PointView, limb_poses, picture, points, vector, vectors};
 use crate::body::{JointParts, PyBody, joint};
 use crate::borrowed::{Borrowed, ColorData, color_images, number};
 use crate::config::config;
@@ -76,7 +76,7 @@ impl PyTracker {
         question: impl FnOnce(&mut Tracker, &Frame, Option<&[Pose]>) -> Result<T, TrackError> + Send,
     ) -> PyResult<T> {
         let poses = poses.map(|poses| limb_poses(self.tracker.body(), &poses)).transpose()?;
-        let (cameras, views) = (self.cameras_of(frame)?, frame.color_views(py));
+        let (cameras, views) = (self.cameras_of(frame)?, frame.color_views(py)?);
         let colors = color_images(&views, &cameras)?;
         let input = Frame::empty(frame.stamp).with_colors(&colors);
         let tracker = &mut self.tracker;
@@ -159,14 +159,14 @@ impl PyTracker {
     }
 
     /// Sets images of the empty scene of the camera with this name; an empty list discards them.
-    fn _set_background(&mut self, py: Python<'_>, source: &str, images: Vec<Bound<'_, PyAny>>) -> PyResult<()> {
-        let mut pictures = Vec::with_capacity(images.len());
+    fn _set_background(&mut self, source: &str, images: Vec<Bound<'_, PyAny>>) -> PyResult<()> {
+        let mut views = Vec::with_capacity(images.len());
         for (index, image) in images.iter().enumerate() {
             let expected = "an array of shape (height, width, 3) or (height, width) and dtype uint8";
             let wrong = || wrong_argument(&format!("images[{index}]"), expected, image);
-            pictures.push(ColorArray::new(image).ok_or_else(wrong)?);
+            let (pixels, size) = picture(image).ok_or_else(wrong)?;
+            views.push((pixels.extract::<ColorView>()?, size));
         }
-        let views: Vec<_> = pictures.iter().map(|(pixels, size)| (pixels.view(py), *size)).collect();
         let pixels = views.iter().map(|(view, size)| Ok((view.pixels()?, *size))).collect::<PyResult<Vec<_>>>()?;
         let camera = number(&mut self.cameras, source);
         self.tracker.set_background(camera, &pixels).map_err(raise)
@@ -214,8 +214,7 @@ impl PyTracker {
 
     /// Signed distance of world points `(N, 3)` to the posed body, meters, negative inside.
     fn distance<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<f32>>> {
-        let array = PointArray::new("points", points)?;
-        let view = array.view(py);
+        let view: PointView = self::points("points", points)?.extract()?;
         let slice = view.points()?;
         let distances = py.detach(|| self.tracker.distance(slice)).map_err(raise)?;
         Ok(PyArray1::from_vec(py, distances))
@@ -223,8 +222,7 @@ impl PyTracker {
 
     /// Signed distances `(limbs, N)` of world points `(N, 3)` to every limb of the posed body, meters, negative inside.
     fn limb_distances<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let array = PointArray::new("points", points)?;
-        let view = array.view(py);
+        let view: PointView = self::points("points", points)?.extract()?;
         let slice = view.points()?;
         let distances = py.detach(|| self.tracker.limb_distances(slice)).map_err(raise)?;
         Ok(PyArray2::from_vec2(py, &distances)?)
