@@ -13,7 +13,7 @@ use voodoo_core::{DepthImage, Ground};
 use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 
 use crate::arrays::{Row, contiguous, vector};
-use crate::errors::{ConfigError, MeasurementError, wrong_argument};
+use crate::errors::{ConfigError, MeasurementError, wrong, wrong_argument};
 
 /// Standard deviation of a joint for which a detector reports none, meters.
 const SIGMA: f64 = 0.05;
@@ -35,11 +35,8 @@ pub(crate) fn detector(given: &Bound<'_, PyAny>) -> PyResult<Option<Box<dyn Dete
     if given.hasattr("joints")? && given.hasattr("detect")? {
         return Ok(Some(Box::new(PythonDetector::new(given)?)));
     }
-    let text = format!(
-        "detector: expected \"shipped\", None, a voodoo.Detector, or an object with joints and detect(image), found {}",
-        given.repr()?
-    );
-    Err(ConfigError::new_err(text))
+    let expected = "\"shipped\", None, a voodoo.Detector, or an object with joints and detect(image)";
+    Err(ConfigError::new_err(wrong("detector", expected, given)))
 }
 
 /// The detector that ships with the library, if this build contains it.
@@ -79,11 +76,8 @@ impl PythonDetector {
     fn new(object: &Bound<'_, PyAny>) -> PyResult<Self> {
         let names = |attribute: &str| -> PyResult<Vec<String>> {
             let Some(found) = object.getattr_opt(attribute)? else { return Ok(Vec::new()) };
-            found.extract().map_err(|_| {
-                let found = found.repr().map_or_else(|_| "something else".into(), |text| text.to_string());
-                let text = format!("detector.{attribute}: expected a sequence of names, found {found}");
-                ConfigError::new_err(text)
-            })
+            let name = format!("detector.{attribute}");
+            found.extract().map_err(|_| ConfigError::new_err(wrong(&name, "a sequence of names", &found)))
         };
         Ok(Self { joints: names("joints")?, lengths: names("lengths")?, object: Arc::new(object.clone().unbind()) })
     }
