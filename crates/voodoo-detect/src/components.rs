@@ -45,7 +45,6 @@ struct Component {
     /// Number of points added so far; every `every`-th of them was kept.
     added: usize,
     every: usize,
-    flat: bool,
 }
 
 impl Component {
@@ -58,7 +57,6 @@ impl Component {
             samples: Vec::with_capacity(COMPONENT_SAMPLES),
             added: 0,
             every: 1,
-            flat: false,
         }
     }
 
@@ -318,25 +316,21 @@ impl Components {
                 parts[part].add(view.point(index));
             }
         }
-        for part in parts.iter_mut() {
-            part.flat = is_flat(&part.samples, (part.high - part.low).max_element());
-        }
     }
 
     /// Proposes every component that may be a person, by itself and together with nearby components.
     fn propose(&self, candidates: &mut Vec<PersonCandidate>) {
         for (number, part) in self.parts.iter().enumerate() {
-            if part.area > AREA[1] || part.area < 0.3 * AREA[0] || part.flat {
+            let large = (0.3 * AREA[0]..=AREA[1]).contains(&part.area);
+            if !large || is_flat(&part.samples, (part.high - part.low).max_element()) {
                 continue;
             }
             let alone = PersonCandidate { labels: vec![part.label], area: part.area, low: part.low, high: part.high };
             let together = self.with_near_parts(number, alone.clone());
             for candidate in [alone, together] {
-                let fits = candidate.area > AREA[0] && candidate.area < AREA[1] && {
-                    let length = (candidate.high - candidate.low).max_element();
-                    length > LENGTH[0] && length < LENGTH[1]
-                };
-                if fits && !candidates.contains(&candidate) {
+                let within = |size: f64, [least, most]: [f64; 2]| least < size && size < most;
+                let length = (candidate.high - candidate.low).max_element();
+                if within(candidate.area, AREA) && within(length, LENGTH) && !candidates.contains(&candidate) {
                     candidates.push(candidate);
                 }
             }

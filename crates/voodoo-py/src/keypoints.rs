@@ -88,14 +88,8 @@ impl PyKeypointLayout {
                 continue;
             };
             let pixel = (found.pixel[0], found.pixel[1]);
-            let surface: Option<f64> = match surface {
-                Some(surface) => surface.call1((pixel,))?.extract()?,
-                None => None,
-            };
-            let hidden: Option<f64> = match before {
-                Some(before) => before.call_method1("get", (&part.site,))?.extract()?,
-                None => None,
-            };
+            let surface: Option<f64> = surface.map_or(Ok(None), |surface| surface.call1((pixel,))?.extract())?;
+            let hidden = before.map_or(Ok(None), |before| before.call_method1("get", (&part.site,))?.extract())?;
             let observation = SiteObservation { pixel: found, expected, hidden: hidden.unwrap_or(0.0), surface };
             match part.measurement(&observation, &sensor, gate.as_mut().map(|gate| &mut gate.0)) {
                 SiteMeasurement::Ray(direction, sigma) => rays.push(PySiteRay {
