@@ -49,15 +49,7 @@ struct Component {
 
 impl Component {
     fn new(label: u32, area: f64) -> Self {
-        Self {
-            label,
-            area,
-            low: Vec3::INFINITY,
-            high: Vec3::NEG_INFINITY,
-            samples: Vec::with_capacity(COMPONENT_SAMPLES),
-            added: 0,
-            every: 1,
-        }
+        Self { label, area, low: Vec3::INFINITY, high: Vec3::NEG_INFINITY, samples: Vec::new(), added: 0, every: 1 }
     }
 
     /// Adds a point; only every `every`-th is kept once there are many.
@@ -295,13 +287,8 @@ impl Components {
     /// Computes the sizes of the components, the largest first.
     fn sum_up(&mut self, view: &ThinnedImage) {
         let Self { labels, parts, areas, distinct, .. } = self;
-        parts.clear();
-        for label in distinct.iter() {
-            let area = f64::from(areas[*label as usize]);
-            if area > LEAST_COMPONENT {
-                parts.push(Component::new(*label, area));
-            }
-        }
+        let part = |label: &u32| Component::new(*label, f64::from(areas[*label as usize]));
+        refill(parts, distinct.iter().map(part).filter(|part| part.area > LEAST_COMPONENT));
         parts.sort_by(|a, b| b.area.total_cmp(&a.area).then(a.label.cmp(&b.label)));
         parts.truncate(MOST_COMPONENTS);
         // From here on the entry at a label's index is its component's index plus one.
