@@ -37,10 +37,10 @@ use network::{Answer, Memory, Network};
 use rejections::Rejections;
 use segmentation::Segmentation;
 use std::sync::{Arc, OnceLock};
-use voodoo_core::Body;
 use voodoo_core::math::{Aabb, Pose, Vec3};
-use voodoo_core::{DepthImage, Ground};
-use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
+use voodoo_core::{
+    Body, DepthImage, Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Ground, Surroundings,
+};
 use weights::WeightsError;
 
 /// Log odds above which a candidate counts as a person.

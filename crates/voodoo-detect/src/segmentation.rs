@@ -4,9 +4,8 @@ use crate::components::{Components, PersonCandidate};
 use crate::crop::Crop;
 use crate::floor::FloorFinder;
 use crate::view::ThinnedImage;
-use voodoo_core::Surroundings;
 use voodoo_core::math::Vec3;
-use voodoo_core::{DepthImage, Ground};
+use voodoo_core::{DepthImage, Ground, Surroundings};
 
 /// Segments depth images into candidates; keeps its memory between images.
 #[derive(Debug, Default)]

@@ -1,9 +1,7 @@
 //! The depth image as the detector uses it: subsampled, in meters, without pixels that cannot belong to a person.
 
-use voodoo_core::Camera;
-use voodoo_core::Surroundings;
 use voodoo_core::math::{Vec3, refill};
-use voodoo_core::{DepthImage, Ground};
+use voodoo_core::{Camera, DepthImage, Ground, Surroundings};
 
 /// Columns and rows are subsampled until an image has at most this many pixels. A person at 4 m is then still 30 pixels wide and
 /// 80 high.

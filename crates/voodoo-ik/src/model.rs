@@ -1,9 +1,8 @@
 //! A body, or a part of one, as a chain with exact joints. The unknowns are the vector of joint angles.
 
-use voodoo_core::BodyError;
 use voodoo_core::kinematics::hinge_axis;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
-use voodoo_core::{Body, JointKind, Limb};
+use voodoo_core::{Body, BodyError, JointKind, Limb};
 
 /// Whether the first limb of the chain is among the unknowns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,9 +1,8 @@
 //! `Body`: created by `voodoo.model.body` from validated parts.
 
 use pyo3::prelude::*;
-use voodoo_core::Body;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
-use voodoo_core::{HumanModel, Joint, Limb, Site};
+use voodoo_core::{Body, HumanModel, Joint, Limb, Site};
 
 use crate::arrays::{Array, frozen};
 use crate::errors::{BodyError, raise};

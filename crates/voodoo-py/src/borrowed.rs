@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use voodoo_core::math::Pose;
-use voodoo_core::{Body, Camera};
-use voodoo_core::{Cloud, ColorImage, DepthImage, DetectedPerson, Frame, PositionRelation, RayRelation, Scope};
+use voodoo_core::{
+    Body, Camera, Cloud, ColorImage, DepthImage, DetectedPerson, Frame, PositionRelation, RayRelation, Scope,
+};
 
 use crate::arrays::{ColorView, DepthView, PointView};
 use crate::errors::raise;

@@ -2,8 +2,7 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use voodoo_core::Config;
-use voodoo_core::{RawValue, Value};
+use voodoo_core::{Config, RawValue, Value};
 
 use crate::errors::ConfigError;
 

@@ -1,17 +1,16 @@
 //! Detection of people in depth images.
 
-use std::sync::Arc;
-
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict};
-use voodoo_core::HumanModel;
 use voodoo_core::math::{Pose, Vec3};
-use voodoo_core::{Body, Camera, Frame};
-use voodoo_core::{DepthImage, DepthPixels, Ground};
-use voodoo_core::{Detect, DetectError, Detection, DetectionQuery, Surroundings};
+use voodoo_core::{
+    Body, Camera, DepthImage, DepthPixels, Detect, DetectError, Detection, DetectionQuery, Frame, Ground, HumanModel,
+    Surroundings,
+};
 use voodoo_detect::crop::SIZE;
 use voodoo_detect::segmentation::Segmentation;
 use voodoo_detect::{Detector, JOINTS, LENGTHS};

@@ -9,8 +9,7 @@ use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
 use voodoo_core::math::{Vec3, matrix};
-use voodoo_core::{DepthImage, Ground};
-use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
+use voodoo_core::{DepthImage, Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Ground, Surroundings};
 
 use crate::arrays::{Row, contiguous, vector};
 use crate::errors::{ConfigError, MeasurementError, wrong, wrong_argument};

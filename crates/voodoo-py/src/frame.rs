@@ -5,9 +5,8 @@ use std::sync::Arc;
 use numpy::{PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use voodoo_core::Camera;
 use voodoo_core::math::Aabb;
-use voodoo_core::{Cloud, Ground, PointSlice, PositionRelation, RayRelation, Scope};
+use voodoo_core::{Camera, Cloud, Ground, PointSlice, PositionRelation, RayRelation, Scope};
 
 use crate::arguments;
 use crate::arrays::{DepthView, Row, picture, points, pose, unmasked, vector, viewable};

@@ -4,9 +4,8 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use voodoo_core::PeopleOptions;
 use voodoo_core::math::{Aabb, Vec3};
-use voodoo_core::{BodyTracker, Frame, People};
+use voodoo_core::{BodyTracker, Frame, People, PeopleOptions};
 
 use crate::body::PyBody;
 use crate::borrowed::{Borrowed, Parts};

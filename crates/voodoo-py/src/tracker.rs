@@ -5,9 +5,8 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use voodoo_core::RegionLine;
 use voodoo_core::math::{Pose, Vec3};
-use voodoo_core::{Body, Frame, TrackError, Tracker};
+use voodoo_core::{Body, Frame, RegionLine, TrackError, Tracker};
 
 use crate::arrays::{ColorView, PointView, limb_poses, picture, points, vector, vectors};
 use crate::body::{JointParts, PyBody, joint};
