@@ -36,7 +36,7 @@ use crop::Crop;
 use network::{Answer, Memory, Network};
 use rejections::Rejections;
 use segmentation::Segmentation;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, LazyLock};
 use voodoo_core::math::{Aabb, Pose, Vec3};
 use voodoo_core::{
     Body, DepthImage, Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Ground, Surroundings,
@@ -78,12 +78,9 @@ pub struct Detector {
     rejections: Rejections,
 }
 
-/// The network that ships with the library, read once.
-fn shipped() -> Result<Arc<Network>, WeightsError> {
-    static NETWORK: OnceLock<Result<Arc<Network>, WeightsError>> = OnceLock::new();
-    let read = || Network::read(include_bytes!("../person.weights")).map(Arc::new);
-    NETWORK.get_or_init(read).clone()
-}
+/// The network that ships with the library, read at first use.
+static SHIPPED: LazyLock<Result<Arc<Network>, WeightsError>> =
+    LazyLock::new(|| Network::read(include_bytes!("../person.weights")).map(Arc::new));
 
 impl Detector {
     /// A detector with the network that ships with the library. Its weights are read once per process, at the first image.
@@ -159,10 +156,7 @@ impl Detect for Detector {
         around: &Surroundings,
         query: DetectionQuery,
     ) -> Result<Vec<Detection>, DetectError> {
-        let network = match &self.network {
-            Some(network) => network.clone(),
-            None => shipped()?,
-        };
+        let network = self.network.clone().map_or_else(|| SHIPPED.clone(), Ok)?;
         self.found.clear();
         self.nearest = None;
         self.rejections.next_image();
@@ -304,7 +298,6 @@ fn detection(answer: &Answer, crop: &Crop, candidate: &PersonCandidate, world_fr
         person: f64::from(answer.person),
         low: bounds.mins,
         high: bounds.maxs,
-        floor: None,
-        pixels: Vec::new(),
+        ..Detection::default()
     }
 }
