@@ -26,14 +26,14 @@ impl IkSolver {
             self.gain *= 0.5;
         }
         // First without the lower levels; then with a quarter of the failed level's own part; then with the levels above only.
-        for (stage, fraction) in [(failed, 1.0), (failed, 0.25), (failed, 0.0)] {
-            if (stage == last && fraction == 1.0) || (stage == 0 && fraction == 0.0) {
+        for fraction in [1.0, 0.25, 0.0] {
+            if (failed == last && fraction == 1.0) || (failed == 0 && fraction == 0.0) {
                 continue;
             }
-            self.propose(problem, angles, stage, fraction);
+            self.propose(problem, angles, failed, fraction);
             self.evaluate(problem);
             let above = Active { levels: count.min(failed + 1), image: image && failed == count, slack };
-            if (fraction == 0.0 && slack) || self.first_failure(n, above, stage).is_none() {
+            if (fraction == 0.0 && slack) || self.first_failure(n, above, failed).is_none() {
                 return self.take_trial(angles);
             }
         }

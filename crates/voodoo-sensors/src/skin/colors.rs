@@ -84,11 +84,11 @@ impl SkinColors {
 
 /// Smoothed and normalized histogram of colors; `None` for fewer than [`FEWEST`].
 fn histogram(bins: impl Iterator<Item = usize>) -> Option<Vec<f32>> {
-    let (mut values, mut count) = (vec![0.0_f32; BINS], 0.0_f32);
-    bins.for_each(|bin| {
-        values[bin] += 1.0;
-        count += 1.0;
-    });
+    let mut values = vec![0.0_f32; BINS];
+    bins.for_each(|bin| values[bin] += 1.0);
+    if values.iter().sum::<f32>() < FEWEST {
+        return None;
+    }
     for step in [1, 1, CHROMA_BINS, CHROMA_BINS] {
         // A binomial kernel along one axis; its ends are repeated.
         let place = |index: usize| index / step % CHROMA_BINS;
@@ -100,7 +100,7 @@ fn histogram(bins: impl Iterator<Item = usize>) -> Option<Vec<f32>> {
         values = (0..BINS).map(smoothed).collect();
     }
     normalize(&mut values);
-    (count >= FEWEST).then_some(values)
+    Some(values)
 }
 
 fn normalize(values: &mut [f32]) {
