@@ -657,9 +657,6 @@ class PersonCandidate:
     def roll(self) -> float:
         """Rotation of the camera about its optical axis that makes the vertical point up in the image [rad]."""
     @property
-    def area(self) -> float:
-        """Visible surface area [m^2]."""
-    @property
     def floor(self) -> tuple[tuple[float, float, float], float] | None:
         """Normal and offset of the ground plane, given or detected."""
 

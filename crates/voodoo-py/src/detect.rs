@@ -30,7 +30,7 @@ impl PyDetector {
     #[new]
     #[pyo3(signature = (*, weights=None, stature=None, stature_sigma=0.02))]
     fn new(weights: Option<PathBuf>, stature: Option<f64>, stature_sigma: f64) -> PyResult<Self> {
-        let detector = weights.map_or_else(|| Ok(Detector::new()), Self::with_weights)?;
+        let detector = weights.map_or_else(|| Ok(Detector::new()), with_weights)?;
         let Some(stature) = stature else { return Ok(Self(detector)) };
         if !((0.3..=3.0).contains(&stature) && stature_sigma > 0.0 && stature_sigma.is_finite()) {
             let expected = "meters from 0.3 to 3.0, and a relative standard deviation above 0";
@@ -76,13 +76,11 @@ impl PyDetector {
     }
 }
 
-impl PyDetector {
-    fn with_weights(path: PathBuf) -> PyResult<Detector> {
-        let refused = |found: String| MeasurementError::new_err(format!("{}: {found}", path.display()));
-        let bytes =
-            std::fs::read(&path).map_err(|error| refused(format!("expected a readable file, found {error}")))?;
-        Detector::with_weights(&bytes).map_err(|error| refused(error.to_string()))
-    }
+/// A detector with the network of a file.
+fn with_weights(path: PathBuf) -> PyResult<Detector> {
+    let refused = |found: String| MeasurementError::new_err(format!("{}: {found}", path.display()));
+    let bytes = std::fs::read(&path).map_err(|error| refused(format!("expected a readable file, found {error}")))?;
+    Detector::with_weights(&bytes).map_err(|error| refused(error.to_string()))
 }
 
 #[doc = stub!("Detection")]
@@ -165,8 +163,6 @@ pub(crate) struct PyCandidate {
     middle: [f64; 3],
     #[doc = stub!("PersonCandidate.roll")]
     roll: f64,
-    #[doc = stub!("PersonCandidate.area")]
-    area: f64,
     #[doc = stub!("PersonCandidate.floor")]
     floor: Option<([f64; 3], f64)>,
 }
@@ -218,7 +214,6 @@ pub(crate) fn person_candidates<'py>(
             mask: mask(py, &camera, &pixels)?,
             middle: crop.middle,
             roll: crop.roll,
-            area: candidate.area,
             floor: segmentation.floor.map(|floor| (floor.normal.to_array(), floor.offset)),
         });
     }

@@ -53,7 +53,6 @@ impl PyFrame {
 #[pymethods]
 impl PyFrame {
     #[new]
-    #[pyo3(signature = (stamp))]
     fn new(#[pyo3(from_py_with = arguments::stamp)] stamp: f64) -> Self {
         Self { stamp, ..Self::default() }
     }

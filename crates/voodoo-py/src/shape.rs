@@ -26,7 +26,6 @@ pub(crate) struct PyClosestPoints {
 #[pymethods]
 impl PyShape {
     #[new]
-    #[pyo3(signature = (length, a0, b0, a1, b1))]
     fn new(
         #[pyo3(from_py_with = arguments::length)] length: f64,
         #[pyo3(from_py_with = arguments::a0)] a0: f64,
