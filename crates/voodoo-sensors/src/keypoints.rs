@@ -6,7 +6,6 @@ use voodoo_core::math::Vec3;
 
 /// Standard deviation added for each meter of the person's own body before the site, beyond half a limb: the network guesses such
 /// a site.
-/// site.
 const GUESSED: f64 = 0.4;
 
 /// A site and the keypoints that define it.
