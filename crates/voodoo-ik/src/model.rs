@@ -49,8 +49,8 @@ pub struct ChainModel {
     links: Vec<Link>,
     names: Vec<String>,
     limits: Vec<[f64; 2]>,
-    /// For every link, the unknowns that move it; and where they start in that list.
-    movers: Vec<Vec<usize>>,
+    /// For every link, the unknowns that move it.
+    pub(super) movers: Vec<Vec<usize>>,
 }
 
 /// Derivative of the world position of a point `x` on any limb distal to the joint: `omega x x + v` for a unit rate of the
@@ -150,11 +150,6 @@ impl ChainModel {
         self.names.len()
     }
 
-    /// The unknowns that move a link.
-    pub fn movers(&self, link: usize) -> &[usize] {
-        &self.movers[link]
-    }
-
     /// The link of a limb of the body.
     pub fn link_of(&self, limb: usize) -> Option<usize> {
         self.links.iter().position(|link| link.limb == limb)
@@ -185,9 +180,7 @@ impl ChainModel {
                 }
                 Turn::Free => {
                     let axes = Mat3::from_quat(joint.rotation);
-                    for v in [axes.x_axis, axes.y_axis, axes.z_axis] {
-                        columns.push(Column { omega: Vec3::ZERO, v });
-                    }
+                    columns.extend([axes.x_axis, axes.y_axis, axes.z_axis].map(|v| Column { omega: Vec3::ZERO, v }));
                     let center = joint.translation + joint.rotation * Vec3::new(value[0], value[1], value[2]);
                     let joint = Pose::from_parts(center, joint.rotation);
                     let rotation = ball(Vec3::new(value[3], value[4], value[5]), &joint, columns);

@@ -130,16 +130,6 @@ impl PyBody {
         self.parts_with(readable)
     }
 
-    #[doc = stub!("Body.sizes")]
-    fn sizes<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
-        let limbs = self.0.limbs();
-        let sizes = |limb: &Limb| {
-            let shape = &limb.shape;
-            [shape.length(), shape.a0(), shape.b0(), shape.a1(), shape.b1()]
-        };
-        frozen(py, limbs.iter().flat_map(sizes).collect(), &[limbs.len(), 5])
-    }
-
     #[doc = stub!("Body.at_rest")]
     fn at_rest<'py>(&self, py: Python<'py>) -> PyResult<(Array<'py>, Array<'py>)> {
         let rest = at_rest(&self.0);
