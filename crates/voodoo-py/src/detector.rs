@@ -192,8 +192,7 @@ where
 {
     let Some(found) = given(person, attribute)? else { return Ok(HashMap::new()) };
     let pairs = found.py().get_type::<PyDict>().call1((&found,));
-    let found_pairs = pairs.and_then(|pairs| pairs.extract());
-    found_pairs.map_err(|_| wrong_argument(attribute, "a mapping from names", &found))
+    pairs.and_then(|pairs| pairs.extract()).map_err(|_| wrong_argument(attribute, "a mapping from names", &found))
 }
 
 /// An attribute; none where it is missing or None.
@@ -212,10 +211,9 @@ fn of_each(person: &Bound<'_, PyAny>, attribute: &str, default: f64) -> PyResult
 /// Log odds of an attribute that is a probability, or None.
 fn log_odds(person: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Option<f64>> {
     let Some(found) = given(person, attribute)? else { return Ok(None) };
+    let wrong = || wrong_argument(attribute, "a probability, from 0 to 1", &found);
     let probability = found.extract::<f64>().ok().filter(|value| (0.0..=1.0).contains(value));
-    let probability = probability
-        .ok_or_else(|| wrong_argument(attribute, "a probability, from 0 to 1", &found))?
-        .clamp(LEAST, 1.0 - LEAST);
+    let probability = probability.ok_or_else(wrong)?.clamp(LEAST, 1.0 - LEAST);
     Ok(Some((probability / (1.0 - probability)).ln()))
 }
 

@@ -32,19 +32,14 @@ fn colors_of<'a>(image: &'a PyReadonlyArray3<'_, u8>) -> PyResult<&'a [[u8; 3]]>
 #[doc = stub!("SkinCue")]
 #[pyclass(name = "SkinCue", module = "voodoo._core")]
 #[derive(Clone)]
-pub struct PySkinCue {
-    cue: SkinCue,
-    /// Height and width of the last image.
-    size: [usize; 2],
-}
+pub struct PySkinCue(SkinCue);
 
 #[pymethods]
 impl PySkinCue {
     #[new]
     #[pyo3(signature = (sites, *, gate, growth, lost_gate, widest_gate))]
     fn new(sites: Vec<String>, gate: f64, growth: f64, lost_gate: f64, widest_gate: f64) -> Self {
-        let settings = SkinSettings { sites, gate, growth, lost_gate, widest_gate };
-        Self { cue: SkinCue::new(settings), size: [0; 2] }
+        Self(SkinCue::new(SkinSettings { sites, gate, growth, lost_gate, widest_gate }))
     }
 
     fn __copy__(&self) -> Self {
@@ -53,28 +48,28 @@ impl PySkinCue {
 
     #[getter]
     fn learned(&self) -> u32 {
-        self.cue.colors.learned
+        self.0.colors.learned
     }
 
     #[getter]
     fn mask<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
-        let ([rows, columns], skin) = &self.cue.mask;
-        let mut mask = vec![false; self.size[0] * self.size[1]];
+        let SkinCue { size, mask: ([rows, columns], skin), .. } = &self.0;
+        let mut mask = vec![false; size[0] * size[1]];
         for (row, skin) in rows.clone().zip(skin.chunks_exact(columns.len().max(1))) {
-            let line = &mut mask[row * self.size[1]..][columns.clone()];
+            let line = &mut mask[row * size[1]..][columns.clone()];
             line.iter_mut().zip(skin).for_each(|(mask, skin)| *mask = *skin != 0);
         }
-        PyArray1::from_vec(py, mask).reshape(self.size)
+        PyArray1::from_vec(py, mask).reshape(*size)
     }
 
     #[getter]
     fn candidates(&self) -> Vec<(f64, f64)> {
-        self.cue.candidates.iter().map(|item| item.pixel.into()).collect()
+        self.0.candidates.iter().map(|item| item.pixel.into()).collect()
     }
 
     #[getter]
     fn assigned(&self) -> Vec<(usize, usize)> {
-        self.cue.assigned.clone()
+        self.0.assigned.clone()
     }
 
     #[doc = stub!("SkinCue.observe")]
@@ -94,7 +89,7 @@ impl PySkinCue {
     ) -> PyResult<Vec<Ray>> {
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let mut expected = Vec::new();
-        for (site, name) in self.cue.settings.sites.iter().enumerate() {
+        for (site, name) in self.0.settings.sites.iter().enumerate() {
             let elbow = format!("{}_elbow", name.chars().take(1).collect::<String>());
             let places = places_of(predicted, [name, &elbow])?;
             let [place, elbow] = [0, 1].map(|index| places[index].filter(|place| !place.is_nan()));
@@ -111,8 +106,8 @@ impl PySkinCue {
         });
         let depth = depth.transpose()?;
         let beside = depth.as_ref().map(|(view, per_unit, camera, pose)| {
-            let depth = Eye { world_from_sensor: *pose, camera };
-            DepthBeside::new(view.pixels()?, *per_unit, depth, eye).map_err(raise)
+            let eye = Eye { world_from_sensor: *pose, camera };
+            Ok::<_, PyErr>(DepthBeside { image: view.pixels()?, meters_per_unit: *per_unit, eye })
         });
         let others = others.iter().map(TrackedBody::tracker).collect::<PyResult<Vec<_>>>()?;
         let input = SkinInput {
@@ -125,8 +120,7 @@ impl PySkinCue {
             tracker: tracker.as_ref().map(TrackedBody::tracker).transpose()?,
             others: &others,
         };
-        self.size = [camera.height(), camera.width()];
-        let cue = &mut self.cue;
+        let cue = &mut self.0;
         let found = py.detach(|| cue.observe(&input)).map_err(raise)?;
         Ok(found.iter().map(|site| (site.site, Row(site.direction), site.place.map(Row), site.depth)).collect())
     }
@@ -144,7 +138,7 @@ impl PySkinCue {
     ) -> PyResult<()> {
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let (image, joints, sites) = (colors_of(&image)?, vectors("joints", &joints)?, vectors("sites", &sites)?);
-        let cue = &mut self.cue;
+        let cue = &mut self.0;
         py.detach(|| cue.learn(image, &eye, &joints, &sites)).map_err(raise)
     }
 }

@@ -142,6 +142,8 @@ pub struct SkinCue {
     pub settings: SkinSettings,
     /// The learned colors.
     pub colors: SkinColors,
+    /// Height and width of the last image.
+    pub size: [usize; 2],
     /// The part of the last image that was searched, and its pixels of skin.
     pub mask: (Window, Vec<u8>),
     /// The candidates in the last image.
@@ -167,11 +169,15 @@ impl SkinCue {
     /// Finds the skin regions of an image; returns a ray for each detected site.
     ///
     /// # Errors
-    /// [`TrackError`] when the image is not of the camera's size, or a tracker has no pose.
+    /// [`TrackError`] when an image is not of its camera's size, or a tracker has no pose.
     pub fn observe(&mut self, input: &SkinInput) -> Result<Vec<FoundSite>, TrackError> {
         input.eye.check("image", "a color for every pixel of the camera", input.image.len())?;
+        if let Some(depth) = &input.depth {
+            depth.eye.check("depth", "a depth for every pixel of the camera", depth.image.len())?;
+        }
         let depth = |site: &Expected| input.eye.in_sensor(site.place).z;
         let sites: Vec<Expected> = input.expected.iter().filter(|site| depth(site) > NEAREST).copied().collect();
+        self.size = [input.eye.camera.height(), input.eye.camera.width()];
         self.candidates.clear();
         self.assigned.clear();
         self.mask.1.clear();
@@ -210,7 +216,7 @@ impl SkinCue {
             let rays = input.eye.camera.rays();
             let marked = pixels(&window).zip(mask.iter_mut().zip(&mut ranges)).filter(|(_, (mask, _))| **mask != 0);
             for (pixel, (mask, range)) in marked {
-                if let Some(z) = depth.at(rays[index(pixel)].map(f64::from), 0.5 * (near + far)) {
+                if let Some(z) = depth.at(&input.eye, rays[index(pixel)].map(f64::from), 0.5 * (near + far)) {
                     (*mask, *range) = (u8::from(near < z && z < far), z);
                 }
             }
