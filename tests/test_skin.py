@@ -206,9 +206,7 @@ def test_lost_tracking_teaches_nothing():
     skin = SkinTracker()
     pose = Pose((160, 60), (110, 120), (210, 120))
     pose.status = "lost"
-    before = skin._cue.colors
     skin.learn(shown(picture((160, 60), (110, 120), (210, 120))), pose)
-    np.testing.assert_array_equal(before, skin._cue.colors)
     assert not skin._cue.learned
 
 

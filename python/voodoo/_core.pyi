@@ -117,8 +117,6 @@ class SkinCue:
     @property
     def learned(self) -> int: ...
     @property
-    def colors(self) -> npt.NDArray[np.float32]: ...
-    @property
     def mask(self) -> npt.NDArray[np.bool_]: ...
     @property
     def candidates(self) -> list[tuple[float, float]]: ...
@@ -452,8 +450,6 @@ class Body:
     def human(stature: float, model: str) -> Body: ...
     def scaled(self, factor: float) -> Body: ...
     def parts(self) -> tuple[str, list[Any], list[Any]]: ...
-    def sizes(self) -> npt.NDArray[np.float64]:
-        """Of each limb (L, 5) length, a0, b0, a1 and b1 of its shape [m]."""
     def at_rest(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
         """Orientations standing_from_limb (L, 3, 3), and where each limb is joined to its parent, in its own frame (L, 3) [m]."""
     def __eq__(self, value: object, /) -> bool: ...
@@ -658,9 +654,6 @@ class PersonCandidate:
     @property
     def roll(self) -> float:
         """Rotation of the camera about its optical axis that makes the vertical point up in the image [rad]."""
-    @property
-    def area(self) -> float:
-        """Visible surface area [m^2]."""
     @property
     def floor(self) -> tuple[tuple[float, float, float], float] | None:
         """Normal and offset of the ground plane, given or detected."""

@@ -2,7 +2,7 @@
 
 use crate::view::ThinnedImage;
 use nalgebra::{Matrix3, Vector3};
-use voodoo_core::math::{Vec3, widest};
+use voodoo_core::math::{Vec3, refill, reset, widest};
 
 /// Neighboring pixels are connected when their depths differ by less than this, meters, plus this fraction of the depth.
 const STEP: [f32; 2] = [0.04, 0.012];
@@ -34,34 +34,22 @@ const LEFT_BY_TWO: u8 = 4;
 const UP_BY_TWO: u8 = 8;
 
 /// A connected component; camera frame, meters.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Component {
     label: u32,
     area: f64,
     low: Vec3,
     high: Vec3,
-    samples: [Vec3; COMPONENT_SAMPLES],
-    sampled: usize,
+    /// At most [`COMPONENT_SAMPLES`] of its points.
+    samples: Vec<Vec3>,
     /// Number of points added so far; every `every`-th of them was kept.
     added: usize,
     every: usize,
-    flat: bool,
 }
 
 impl Component {
     fn new(label: u32, area: f64) -> Self {
-        let samples = [Vec3::ZERO; COMPONENT_SAMPLES];
-        Self {
-            label,
-            area,
-            low: Vec3::INFINITY,
-            high: Vec3::NEG_INFINITY,
-            samples,
-            sampled: 0,
-            added: 0,
-            every: 1,
-            flat: false,
-        }
+        Self { label, area, low: Vec3::INFINITY, high: Vec3::NEG_INFINITY, samples: Vec::new(), added: 0, every: 1 }
     }
 
     /// Adds a point; only every `every`-th is kept once there are many.
@@ -70,15 +58,12 @@ impl Component {
         self.high = self.high.max(point);
         // `every` is a power of two, which avoids a division per pixel.
         if self.added & (self.every - 1) == 0 {
-            if self.sampled == COMPONENT_SAMPLES {
+            if self.samples.len() == COMPONENT_SAMPLES {
                 // Drops every second kept point to make room.
-                for number in 0..COMPONENT_SAMPLES / 2 {
-                    self.samples[number] = self.samples[2 * number];
-                }
-                (self.sampled, self.every) = (COMPONENT_SAMPLES / 2, 2 * self.every);
+                self.samples = self.samples.iter().step_by(2).copied().collect();
+                self.every *= 2;
             }
-            self.samples[self.sampled] = point;
-            self.sampled += 1;
+            self.samples.push(point);
         }
         self.added += 1;
     }
@@ -143,10 +128,9 @@ pub(crate) struct Components {
 impl Components {
     /// Finds candidates for persons, those with the most probable sizes first.
     pub(crate) fn find(&mut self, view: &ThinnedImage, candidates: &mut Vec<PersonCandidate>) {
-        self.labels.clear();
-        self.labels.extend(view.depth.iter().enumerate().map(|(index, z)| if *z > 0.0 { index as u32 } else { NONE }));
-        self.again.clear();
-        self.again.resize(view.depth.len(), 1);
+        let label = |(index, z): (usize, &f32)| if *z > 0.0 { index as u32 } else { NONE };
+        refill(&mut self.labels, view.depth.iter().enumerate().map(label));
+        reset(&mut self.again, view.depth.len(), 1);
         let mut finer = 1.0;
         self.join(view, finer);
         self.measure(view);
@@ -167,9 +151,8 @@ impl Components {
     /// Splits components that are too large: connects their pixels again with smaller steps.
     fn cut(&mut self, view: &ThinnedImage, finer: f32) {
         let Self { labels, areas, again, .. } = self;
-        again.clear();
         let too_large = |label: &u32| *label != NONE && f64::from(areas[*label as usize]) > AREA[1];
-        again.extend(labels.iter().map(|label| u8::from(too_large(label))));
+        refill(again, labels.iter().map(|label| u8::from(too_large(label))));
         for ((label, again), index) in labels.iter_mut().zip(again).zip(0..) {
             if *again > 0 {
                 *label = index;
@@ -222,8 +205,7 @@ impl Components {
     fn link(&mut self, view: &ThinnedImage, finer: f32) {
         let Self { linked, needed, again, .. } = self;
         let width = view.width;
-        linked.clear();
-        linked.resize(view.depth.len(), 0);
+        reset(linked, view.depth.len(), 0);
         needed.clear();
         widest(
             #[inline(always)]
@@ -305,13 +287,8 @@ impl Components {
     /// Computes the sizes of the components, the largest first.
     fn sum_up(&mut self, view: &ThinnedImage) {
         let Self { labels, parts, areas, distinct, .. } = self;
-        parts.clear();
-        for label in distinct.iter() {
-            let area = f64::from(areas[*label as usize]);
-            if area > LEAST_COMPONENT {
-                parts.push(Component::new(*label, area));
-            }
-        }
+        let part = |label: &u32| Component::new(*label, f64::from(areas[*label as usize]));
+        refill(parts, distinct.iter().map(part).filter(|part| part.area > LEAST_COMPONENT));
         parts.sort_by(|a, b| b.area.total_cmp(&a.area).then(a.label.cmp(&b.label)));
         parts.truncate(MOST_COMPONENTS);
         // From here on the entry at a label's index is its component's index plus one.
@@ -326,25 +303,21 @@ impl Components {
                 parts[part].add(view.point(index));
             }
         }
-        for part in parts.iter_mut() {
-            part.flat = is_flat(&part.samples[..part.sampled], (part.high - part.low).max_element());
-        }
     }
 
     /// Proposes every component that may be a person, by itself and together with nearby components.
     fn propose(&self, candidates: &mut Vec<PersonCandidate>) {
         for (number, part) in self.parts.iter().enumerate() {
-            if part.area > AREA[1] || part.area < 0.3 * AREA[0] || part.flat {
+            let large = (0.3 * AREA[0]..=AREA[1]).contains(&part.area);
+            if !large || is_flat(&part.samples, (part.high - part.low).max_element()) {
                 continue;
             }
             let alone = PersonCandidate { labels: vec![part.label], area: part.area, low: part.low, high: part.high };
             let together = self.with_near_parts(number, alone.clone());
             for candidate in [alone, together] {
-                let fits = candidate.area > AREA[0] && candidate.area < AREA[1] && {
-                    let length = (candidate.high - candidate.low).max_element();
-                    length > LENGTH[0] && length < LENGTH[1]
-                };
-                if fits && !candidates.contains(&candidate) {
+                let within = |size: f64, [least, most]: [f64; 2]| least < size && size < most;
+                let length = (candidate.high - candidate.low).max_element();
+                if within(candidate.area, AREA) && within(length, LENGTH) && !candidates.contains(&candidate) {
                     candidates.push(candidate);
                 }
             }
@@ -383,8 +356,7 @@ fn near(a: &Component, b: &Component) -> bool {
     if gap > GAP {
         return false;
     }
-    let others = &b.samples[..b.sampled];
-    a.samples[..a.sampled].iter().any(|p| others.iter().any(|q| p.distance_squared(*q) < GAP * GAP))
+    a.samples.iter().any(|p| b.samples.iter().any(|q| p.distance_squared(*q) < GAP * GAP))
 }
 
 /// Whether points, whose box has this longest edge, lie near a plane.

@@ -4,7 +4,8 @@
 
 use crate::product::Panels;
 use crate::weights::{Weights, WeightsError};
-use crate::winograd::{KERNEL, Tiles, Winograd};
+use crate::winograd::{KERNEL, Winograd, Working};
+use voodoo_core::math::reset;
 
 /// A square feature map.
 #[derive(Clone, Debug, Default)]
@@ -14,17 +15,11 @@ pub(crate) struct Map {
     pub(crate) values: Vec<f32>,
 }
 
-/// Working memory of convolutions.
-#[derive(Debug, Default)]
-pub(crate) struct Working {
-    columns: Vec<f32>,
-    tiles: Tiles,
-}
-
 /// A convolution; maps are padded with zeros.
 #[derive(Debug)]
 pub(crate) struct Convolution {
     products: Products,
+    pub(crate) outputs: usize,
     kernel: usize,
     stride: usize,
     padding: usize,
@@ -59,28 +54,21 @@ impl Convolution {
         } else {
             Products::Whole(Panels::from_weights(weights, bias))
         };
-        Self { products, kernel, stride, padding: usize::from(kernel > 1) }
-    }
-
-    pub(crate) fn outputs(&self) -> usize {
-        match &self.products {
-            Products::Whole(panels) => panels.outputs,
-            Products::Tiled(tiled) => tiled.outputs(),
-        }
+        Self { products, outputs: bias.len(), kernel, stride, padding: usize::from(kernel > 1) }
     }
 
     /// Writes the output map.
     pub(crate) fn apply(&self, map: &Map, out: &mut Map, working: &mut Working, relu: bool) {
         out.edge = (map.edge + 2 * self.padding - self.kernel) / self.stride + 1;
-        out.channels = self.outputs();
+        out.channels = self.outputs;
         out.values.resize(out.edge * out.edge * out.channels, 0.0);
         match &self.products {
             Products::Whole(panels) if self.kernel == 1 => panels.apply(&map.values, &mut out.values),
             Products::Whole(panels) => {
-                self.gather(map, out.edge, &mut working.columns);
-                panels.apply(&working.columns, &mut out.values);
+                self.gather(map, out.edge, &mut working.inputs);
+                panels.apply(&working.inputs, &mut out.values);
             }
-            Products::Tiled(tiled) => tiled.apply(&map.values, map.edge, &mut working.tiles, &mut out.values),
+            Products::Tiled(tiled) => tiled.apply(&map.values, map.edge, working, &mut out.values),
         }
         if relu {
             rectify(&mut out.values);
@@ -90,9 +78,7 @@ impl Convolution {
     /// Gathers the kernel window of every pixel, one after the other; zeros outside of the map.
     fn gather(&self, map: &Map, edge: usize, columns: &mut Vec<f32>) {
         let row_of = self.kernel * map.channels;
-        columns.clear();
-        let pixels = edge * edge;
-        columns.resize(pixels * self.kernel * row_of, 0.0);
+        reset(columns, edge * edge * self.kernel * row_of, 0.0);
         for (number, chunk) in columns.chunks_exact_mut(row_of).enumerate() {
             let (pixel, ky) = (number / self.kernel, number % self.kernel);
             let Some(row) = (pixel / edge * self.stride + ky).checked_sub(self.padding).filter(|row| *row < map.edge)
@@ -132,7 +118,7 @@ mod tests {
             let map = Map { edge, channels, values: noise(edge * edge * channels, 0.3) };
             let weights = noise(outputs * kernel * kernel * channels, 7.1);
             let layer = Convolution::from_weights(&weights, &noise(outputs, 1.7), kernel, stride, edge);
-            assert_eq!((layer.outputs(), layer.padding), (outputs, padding));
+            assert_eq!((layer.outputs, layer.padding), (outputs, padding));
             let (mut out, mut working) = (Map { values: vec![5.0; 3], ..Map::default() }, Working::default());
             layer.apply(&map, &mut out, &mut working, false);
             assert_eq!(out.edge, (edge + 2 * padding - kernel) / stride + 1);

@@ -49,20 +49,15 @@ impl Crop {
         }
         let middle = [median(&mut xs)?, median(&mut ys)?, median(&mut zs)?];
         let z0 = middle[2];
-        let (pixel, half) = ((WIDTH / enlarged / SIZE as f64) as f32, 0.5 * (SIZE as f32 - 1.0));
+        let (size, half) = ((WIDTH / enlarged / SIZE as f64) as f32, 0.5 * (SIZE as f32 - 1.0));
         let range = (DEPTH / enlarged) as f32;
-        let mut pixels = Vec::with_capacity(SIZE * SIZE);
-        for row in 0..SIZE {
-            for column in 0..SIZE {
-                let x = middle[0] + (column as f32 - half) * pixel / z0;
-                let y = middle[1] + (row as f32 - half) * pixel / z0;
-                let member_index = view.pixel_at([cos * x + sin * y, cos * y - sin * x]).filter(|index| member(*index));
-                pixels.push(member_index.map_or([1.0, 0.0], |index| {
-                    let behind = (view.depth[index] - z0) / range;
-                    [behind.clamp(-1.0, 1.0), 1.0]
-                }));
-            }
-        }
+        let pixel = |number: usize| {
+            let x = middle[0] + ((number % SIZE) as f32 - half) * size / z0;
+            let y = middle[1] + ((number / SIZE) as f32 - half) * size / z0;
+            let index = view.pixel_at([cos * x + sin * y, cos * y - sin * x]).filter(|index| member(*index));
+            index.map_or([1.0, 0.0], |index| [((view.depth[index] - z0) / range).clamp(-1.0, 1.0), 1.0])
+        };
+        let pixels = (0..SIZE * SIZE).map(pixel).collect();
         Some(Self { pixels, middle: middle.map(f64::from), roll, enlarged })
     }
 
@@ -101,7 +96,8 @@ mod tests {
             let image = DepthImage { world_from_sensor, ..image(&pixels) };
             let mut segmentation = Segmentation::default();
             let around = Surroundings { up: Some(-Vec3::Y), ..Surroundings::default() };
-            let candidate = segmentation.find(&image, &around)[0].clone();
+            segmentation.find(&image, &around);
+            let candidate = segmentation.candidates[0].clone();
             let crop = segmentation.crop(&candidate, enlarged).unwrap();
             assert!((crop.roll - roll).abs() < 1e-9, "{}", crop.roll);
             // Every pixel on the person, transformed back to the camera frame, coincides with a measured point.

@@ -134,16 +134,12 @@ impl FloorFinder {
     fn refined(&self, plane: &Ground, fraction: f64) -> Ground {
         let near = |point: &Vec3| fraction * (NEAR[0] + NEAR[1] * point.z * point.z);
         let on = |point: &&Vec3| (plane.normal.dot(**point) - plane.offset).abs() < near(point);
-        let (mut count, mut mean) = (0.0, Vec3::ZERO);
-        for point in self.level.iter().filter(on) {
-            count += 1.0;
-            mean += *point;
-        }
-        mean /= f64::max(count, 1.0);
+        let points: Vec<&Vec3> = self.level.iter().filter(on).collect();
+        let mean = points.iter().copied().sum::<Vec3>() / (points.len() as f64).max(1.0);
         let first = plane.normal.any_orthonormal_vector();
         let second = plane.normal.cross(first);
         let (mut uu, mut uv, mut vv, mut uh, mut vh) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        for point in self.level.iter().filter(on) {
+        for point in points {
             let from = *point - mean;
             let (u, v, h) = (from.dot(first), from.dot(second), from.dot(plane.normal));
             uu += u * u;

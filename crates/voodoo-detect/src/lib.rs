@@ -36,11 +36,11 @@ use crop::Crop;
 use network::{Answer, Memory, Network};
 use rejections::Rejections;
 use segmentation::Segmentation;
-use std::sync::{Arc, OnceLock};
-use voodoo_core::Body;
+use std::sync::{Arc, LazyLock};
 use voodoo_core::math::{Aabb, Pose, Vec3};
-use voodoo_core::{DepthImage, Ground};
-use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
+use voodoo_core::{
+    Body, DepthImage, Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Ground, Surroundings,
+};
 use weights::WeightsError;
 
 /// Log odds above which a candidate counts as a person.
@@ -78,12 +78,9 @@ pub struct Detector {
     rejections: Rejections,
 }
 
-/// The network that ships with the library, read once.
-fn shipped() -> Result<Arc<Network>, WeightsError> {
-    static NETWORK: OnceLock<Result<Arc<Network>, WeightsError>> = OnceLock::new();
-    let read = || Network::read(include_bytes!("../person.weights")).map(Arc::new);
-    NETWORK.get_or_init(read).clone()
-}
+/// The network that ships with the library, read at first use.
+static SHIPPED: LazyLock<Result<Arc<Network>, WeightsError>> =
+    LazyLock::new(|| Network::read(include_bytes!("../person.weights")).map(Arc::new));
 
 impl Detector {
     /// A detector with the network that ships with the library. Its weights are read once per process, at the first image.
@@ -112,8 +109,8 @@ impl Detector {
 
     /// Indices of the last image's candidates that the query evaluates, in order of evaluation.
     fn order(&self, query: DetectionQuery, camera_from_world: &Pose) -> Vec<usize> {
-        let mut order: Vec<usize> = (0..self.segmentation.candidates().len()).collect();
-        let at = |number: usize| &self.segmentation.candidates()[number];
+        let mut order: Vec<usize> = (0..self.segmentation.candidates.len()).collect();
+        let at = |number: usize| &self.segmentation.candidates[number];
         match query {
             DetectionQuery::All => {}
             DetectionQuery::Any => order.sort_by_key(|number| self.rejections.last_rejection(at(*number))),
@@ -159,10 +156,7 @@ impl Detect for Detector {
         around: &Surroundings,
         query: DetectionQuery,
     ) -> Result<Vec<Detection>, DetectError> {
-        let network = match &self.network {
-            Some(network) => network.clone(),
-            None => shipped()?,
-        };
+        let network = self.network.clone().map_or_else(|| SHIPPED.clone(), Ok)?;
         self.found.clear();
         self.nearest = None;
         self.rejections.next_image();
@@ -172,7 +166,7 @@ impl Detect for Detector {
         let mut found: Vec<(usize, Detection)> = Vec::new();
         let mut evaluations = 0;
         for number in order {
-            let candidate = &segmentation.candidates()[number];
+            let candidate = &segmentation.candidates[number];
             let mut evaluate = |enlarged: f64| {
                 let crop = segmentation.crop(candidate, enlarged)?;
                 let answer = network.evaluate(&crop.pixels, memory);
@@ -181,7 +175,7 @@ impl Detect for Detector {
             let Some(mut detection) = evaluate(enlargement(stature.map(|[stature, _]| stature))) else { continue };
             evaluations += 1;
             if nearest.is_none() {
-                *nearest = Some((detection.person, in_world(candidate, &image.world_from_sensor)));
+                *nearest = Some((detection.person, Aabb::new(detection.low, detection.high)));
             }
             if detection.person > PERSON {
                 let enlarged = enlargement(detection.lengths.last().map(|[length, _]| *length));
@@ -202,15 +196,15 @@ impl Detect for Detector {
             }
         }
         found.sort_by(|(_, a), (_, b)| b.person.total_cmp(&a.person));
-        let floor = segmentation.floor().map(|floor| {
+        let floor = segmentation.floor.map(|floor| {
             let normal = image.world_from_sensor.rotation * floor.normal;
             Ground { normal, offset: floor.offset + normal.dot(image.world_from_sensor.translation) }
         });
         let mut kept = Vec::new();
         for (number, mut detection) in found {
-            let candidate = &segmentation.candidates()[number];
+            let candidate = &segmentation.candidates[number];
             // Of candidates that share components only the most confident is kept.
-            if numbers.iter().any(|other| segmentation.candidates()[*other].overlaps(candidate)) {
+            if numbers.iter().any(|other| segmentation.candidates[*other].overlaps(candidate)) {
                 continue;
             }
             detection.floor = floor;
@@ -227,15 +221,10 @@ impl Detect for Detector {
 
     fn reject(&mut self, index: usize) {
         let number = self.found.get(index);
-        if let Some(candidate) = number.and_then(|number| self.segmentation.candidates().get(*number)) {
+        if let Some(candidate) = number.and_then(|number| self.segmentation.candidates.get(*number)) {
             self.rejections.record(candidate, false);
         }
     }
-}
-
-/// World-frame box around a candidate's box.
-fn in_world(candidate: &PersonCandidate, world_from_camera: &Pose) -> Aabb {
-    Aabb::from_points(Aabb::new(candidate.low, candidate.high).corners().map(|corner| *world_from_camera * corner))
 }
 
 /// Factor by which a person of this stature is enlarged in the network's input; 1 where the stature is not known.
@@ -300,7 +289,8 @@ fn detection(answer: &Answer, crop: &Crop, candidate: &PersonCandidate, world_fr
     let length = |(length, scale): (&f32, &f32)| {
         [f64::from(*length).exp() / crop.enlarged, SIGMA_BY_SCALE * f64::from(*scale).exp()]
     };
-    let bounds = in_world(candidate, world_from_camera);
+    let corners = Aabb::new(candidate.low, candidate.high).corners();
+    let bounds = Aabb::from_points(corners.map(|corner| *world_from_camera * corner));
     Detection {
         joints,
         lengths: answer.log_lengths.iter().zip(&answer.log_length_scale).map(length).collect(),
@@ -308,7 +298,6 @@ fn detection(answer: &Answer, crop: &Crop, candidate: &PersonCandidate, world_fr
         person: f64::from(answer.person),
         low: bounds.mins,
         high: bounds.maxs,
-        floor: None,
-        pixels: Vec::new(),
+        ..Detection::default()
     }
 }

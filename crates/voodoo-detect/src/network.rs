@@ -3,10 +3,12 @@
 //! The structure is that of A2J (Xiong et al., "A2J: Anchor-to-Joint Regression Network", ICCV 2019) on a small residual network:
 //! every cell of a 12 x 12 grid predicts, for every joint, its own weight and the joint's offset from the cell.
 
-use crate::convolution::{Convolution, Map, Working, rectify};
+use crate::convolution::{Convolution, Map, rectify};
 use crate::crop::{SIZE, WIDTH};
 use crate::product::Panels;
 use crate::weights::{Weights, WeightsError};
+use crate::winograd::Working;
+use voodoo_core::math::refill;
 
 /// Values per cell and joint: weight, offset to the right, offset down, depth.
 const A_JOINT: usize = 4;
@@ -21,7 +23,7 @@ struct Residual {
 impl Residual {
     fn take(weights: &mut Weights, name: &str, edge: usize, channels: usize) -> Result<Self, WeightsError> {
         let first = Convolution::take(weights, &format!("{name}.a"), [1, edge], channels, None)?;
-        let second = Convolution::take(weights, &format!("{name}.b"), [1, edge], first.outputs(), Some(channels))?;
+        let second = Convolution::take(weights, &format!("{name}.b"), [1, edge], first.outputs, Some(channels))?;
         Ok(Self { first, second })
     }
 
@@ -52,7 +54,7 @@ impl Stage {
         let mut blocks = Vec::new();
         while weights.has(&format!("{name}.res{}.a.weight", blocks.len())) {
             let name = format!("{name}.res{}", blocks.len());
-            blocks.push(Residual::take(weights, &name, edge / stride, reduce.outputs())?);
+            blocks.push(Residual::take(weights, &name, edge / stride, reduce.outputs)?);
         }
         Ok(Self { reduce, blocks })
     }
@@ -97,11 +99,8 @@ pub struct Network {
     middle: Residual,
     head: Convolution,
     hidden: Panels,
-    visible: Panels,
-    facing: Panels,
-    person: Panels,
-    /// Scale of each joint's error, lengths, and scales of their errors.
-    sizes: [Panels; 3],
+    /// Whether each joint is visible, facing, person, scale of each joint's error, lengths, and scales of their errors.
+    overall: [Panels; 6],
 }
 
 impl std::fmt::Debug for Network {
@@ -124,11 +123,11 @@ impl Network {
     pub fn read(bytes: &[u8]) -> Result<Self, WeightsError> {
         let weights = &mut Weights::read(bytes)?;
         let s2 = Stage::take(weights, "s2", [4, SIZE], 2)?;
-        let s3 = Stage::take(weights, "s3", [2, SIZE / 4], s2.reduce.outputs())?;
-        let s4 = Stage::take(weights, "s4", [2, SIZE / 8], s3.reduce.outputs())?;
-        let s5 = Stage::take(weights, "s5", [2, SIZE / 16], s4.reduce.outputs())?;
+        let s3 = Stage::take(weights, "s3", [2, SIZE / 4], s2.reduce.outputs)?;
+        let s4 = Stage::take(weights, "s4", [2, SIZE / 8], s3.reduce.outputs)?;
+        let s5 = Stage::take(weights, "s5", [2, SIZE / 16], s4.reduce.outputs)?;
         let stages = [s2, s3, s4, s5];
-        let [_, third, fourth, fifth] = stages.each_ref().map(|stage| stage.reduce.outputs());
+        let [_, third, fourth, fifth] = stages.each_ref().map(|stage| stage.reduce.outputs);
         let top = [
             Convolution::take(weights, "top5", [1, SIZE / 32], fifth, Some(fourth))?,
             Convolution::take(weights, "top4", [1, SIZE / 16], fourth, Some(third))?,
@@ -137,18 +136,18 @@ impl Network {
         let head = Convolution::take(weights, "head", [1, SIZE / 8], third, None)?;
         let hidden = linear(weights, "hidden", fifth, None)?;
         let mut overall = |name: &str, outputs: Option<usize>| linear(weights, name, hidden.outputs, outputs);
-        let joints = Some(head.outputs() / A_JOINT);
+        let joints = Some(head.outputs / A_JOINT);
         let (visible, facing, person) =
             (overall("visible", joints)?, overall("facing", Some(1))?, overall("person", Some(1))?);
         let length = overall("length", None)?;
         let length_scale = overall("length_scale", Some(length.outputs))?;
-        let sizes = [overall("scale", joints)?, length, length_scale];
-        Ok(Self { stages, top, middle, head, hidden, visible, facing, person, sizes })
+        let overall = [visible, facing, person, overall("scale", joints)?, length, length_scale];
+        Ok(Self { stages, top, middle, head, hidden, overall })
     }
 
     /// Number of joints that it reports.
     pub fn joints(&self) -> usize {
-        self.head.outputs() / A_JOINT
+        self.head.outputs / A_JOINT
     }
 
     /// Evaluates an input image of `SIZE * SIZE` pixels.
@@ -156,8 +155,7 @@ impl Network {
         let Memory { maps, between, top, working } = memory;
         top.edge = SIZE;
         top.channels = 2;
-        top.values.clear();
-        top.values.extend_from_slice(picture.as_flattened());
+        refill(&mut top.values, picture.as_flattened().iter().copied());
         for (number, stage) in self.stages.iter().enumerate() {
             let (before, rest) = maps.split_at_mut(number);
             stage.reduce.apply(before.last().unwrap_or(top), &mut rest[0], working, true);
@@ -181,16 +179,10 @@ impl Network {
     fn overall(&self, pooled: &[f32]) -> Answer {
         let mut values = product(&self.hidden, pooled);
         rectify(&mut values);
-        let [log_scale, log_lengths, log_length_scale] = self.sizes.each_ref().map(|layer| product(layer, &values));
-        Answer {
-            joints: Vec::new(),
-            log_scale,
-            visible: product(&self.visible, &values),
-            facing: product(&self.facing, &values)[0],
-            person: product(&self.person, &values)[0],
-            log_lengths,
-            log_length_scale,
-        }
+        let [visible, facing, person, log_scale, log_lengths, log_length_scale] =
+            self.overall.each_ref().map(|layer| product(layer, &values));
+        let (facing, person) = (facing[0], person[0]);
+        Answer { joints: Vec::new(), log_scale, visible, facing, person, log_lengths, log_length_scale }
     }
 }
 

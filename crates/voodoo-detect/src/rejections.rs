@@ -16,7 +16,6 @@ const REJECTED_IMAGES: usize = 5;
 /// Rejected positions, camera frame, the latest last.
 #[derive(Debug, Default)]
 pub(crate) struct Rejections {
-    evaluations: usize,
     images: usize,
     places: Vec<Rejected>,
 }
@@ -25,7 +24,6 @@ pub(crate) struct Rejections {
 struct Rejected {
     middle: Vec3,
     area: f64,
-    evaluation: usize,
     image: usize,
 }
 
@@ -40,25 +38,19 @@ impl Rejections {
         self.places.iter().any(|place| self.images - place.image < REJECTED_IMAGES && place.matches(candidate))
     }
 
-    /// Number of the evaluation at which a candidate was last rejected; 0 for a new candidate.
-    pub(crate) fn last_rejection(&self, candidate: &PersonCandidate) -> usize {
-        self.places.iter().filter(|place| place.matches(candidate)).map(|place| place.evaluation).max().unwrap_or(0)
+    /// Where a candidate is among the rejected ones, the latest of which is last; `None` for a new candidate.
+    pub(crate) fn last_rejection(&self, candidate: &PersonCandidate) -> Option<usize> {
+        self.places.iter().rposition(|place| place.matches(candidate))
     }
 
     /// Records an evaluation.
     pub(crate) fn record(&mut self, candidate: &PersonCandidate, person: bool) {
-        self.evaluations += 1;
         self.places.retain(|place| !place.matches(candidate));
         if !person {
             if self.places.len() == MOST_REJECTED {
                 self.places.remove(0);
             }
-            self.places.push(Rejected {
-                middle: candidate.middle(),
-                area: candidate.area,
-                evaluation: self.evaluations,
-                image: self.images,
-            });
+            self.places.push(Rejected { middle: candidate.middle(), area: candidate.area, image: self.images });
         }
     }
 }

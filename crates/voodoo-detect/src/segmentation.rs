@@ -4,9 +4,8 @@ use crate::components::{Components, PersonCandidate};
 use crate::crop::Crop;
 use crate::floor::FloorFinder;
 use crate::view::ThinnedImage;
-use voodoo_core::Surroundings;
 use voodoo_core::math::Vec3;
-use voodoo_core::{DepthImage, Ground};
+use voodoo_core::{DepthImage, Ground, Surroundings};
 
 /// Segments depth images into candidates; keeps its memory between images.
 #[derive(Debug, Default)]
@@ -14,14 +13,16 @@ pub struct Segmentation {
     view: ThinnedImage,
     floor_finder: FloorFinder,
     parts: Components,
-    candidates: Vec<PersonCandidate>,
-    floor: Option<Ground>,
+    /// The candidates of the last image, those of a standing person's size first.
+    pub candidates: Vec<PersonCandidate>,
+    /// The floor in the last image, given or estimated, camera frame.
+    pub floor: Option<Ground>,
     up: Vec3,
 }
 
 impl Segmentation {
-    /// Segments an image and returns its candidates, those of a standing person's size first.
-    pub fn find(&mut self, image: &DepthImage, around: &Surroundings) -> &[PersonCandidate] {
+    /// Segments an image into candidates.
+    pub fn find(&mut self, image: &DepthImage, around: &Surroundings) {
         let camera_from_world = image.world_from_sensor.inverse();
         self.view.read(image, around);
         let given = around.ground.map(|ground| {
@@ -36,17 +37,6 @@ impl Segmentation {
             self.view.remove_floor(floor);
         }
         self.parts.find(&self.view, &mut self.candidates);
-        &self.candidates
-    }
-
-    /// The candidates of the last image.
-    pub fn candidates(&self) -> &[PersonCandidate] {
-        &self.candidates
-    }
-
-    /// The floor in the last image, given or estimated, camera frame.
-    pub fn floor(&self) -> Option<Ground> {
-        self.floor
     }
 
     /// The network's input for a candidate of the last image, `enlarged` by this factor.

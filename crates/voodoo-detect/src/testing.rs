@@ -2,11 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use std::sync::LazyLock;
-use voodoo_core::HumanModel;
 use voodoo_core::math::{Pose, Quat, Vec3};
-use voodoo_core::{Body, Camera};
-use voodoo_core::{DepthImage, DepthPixels};
-use voodoo_core::{Rendering, Viewpoint};
+use voodoo_core::{Body, Camera, DepthImage, DepthPixels, HumanModel, Rendering, Viewpoint};
 
 /// The camera.
 static CAMERA: LazyLock<Camera> = LazyLock::new(|| Camera::pinhole(160, 124, [145.0, 145.0, 79.5, 61.5]).unwrap());

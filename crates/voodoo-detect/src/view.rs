@@ -1,9 +1,7 @@
 //! The depth image as the detector uses it: subsampled, in meters, without pixels that cannot belong to a person.
 
-use voodoo_core::Camera;
-use voodoo_core::Surroundings;
-use voodoo_core::math::Vec3;
-use voodoo_core::{DepthImage, Ground};
+use voodoo_core::math::{Vec3, refill};
+use voodoo_core::{Camera, DepthImage, Ground, Surroundings};
 
 /// Columns and rows are subsampled until an image has at most this many pixels. A person at 4 m is then still 30 pixels wide and
 /// 80 high.
@@ -40,8 +38,8 @@ impl ThinnedImage {
             self.camera = Some(image.camera.clone());
             let ray = |row, column| image.camera.pixel_ray(column, row).map(|value| value as f32);
             let rows = (0..height).step_by(step);
-            self.slopes.clear();
-            self.slopes.extend(rows.flat_map(|row| (0..width).step_by(step).map(move |column| ray(row, column))));
+            let slopes = rows.flat_map(|row| (0..width).step_by(step).map(move |column| ray(row, column)));
+            refill(&mut self.slopes, slopes);
         }
         self.depth.clear();
         for (row, slopes) in (0..height).step_by(step).zip(self.slopes.chunks(self.width.max(1))) {

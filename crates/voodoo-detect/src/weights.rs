@@ -69,11 +69,10 @@ impl Weights {
             rest = after;
             tensors.insert(name, (shape, values.as_chunks().0.iter().map(|half| from_half(*half)).collect()));
         }
-        if rest.is_empty() {
-            Ok(Self { tensors })
-        } else {
-            Err(WeightsError::new("the end", format!("{} bytes", rest.len())))
+        if !rest.is_empty() {
+            return Err(WeightsError::new("the end", format!("{} bytes", rest.len())));
         }
+        Ok(Self { tensors })
     }
 
     /// Whether there is a tensor of this name.

@@ -24,10 +24,10 @@ pub(crate) struct Winograd {
     places: Vec<Panels>,
 }
 
-/// Working memory: all tiles of the map, position by position, before and after the products.
+/// Working memory of convolutions: what matrix products read, and the tiles that they write, position by position.
 #[derive(Debug, Default)]
-pub(crate) struct Tiles {
-    input_tiles: Vec<f32>,
+pub(crate) struct Working {
+    pub(crate) inputs: Vec<f32>,
     output_tiles: Vec<f32>,
 }
 
@@ -54,19 +54,11 @@ impl Winograd {
         Self { places: transformed.iter().enumerate().map(panels).collect() }
     }
 
-    pub(crate) fn inputs(&self) -> usize {
-        self.places[0].inputs
-    }
-
-    pub(crate) fn outputs(&self) -> usize {
-        self.places[0].outputs
-    }
-
     /// Writes the output map, which has the same `edge`.
-    pub(crate) fn apply(&self, map: &[f32], edge: usize, tiles: &mut Tiles, out: &mut [f32]) {
-        let (inputs, outputs) = (self.inputs(), self.outputs());
+    pub(crate) fn apply(&self, map: &[f32], edge: usize, working: &mut Working, out: &mut [f32]) {
+        let Panels { inputs, outputs, .. } = self.places[0];
         let count = (edge / OUTPUT_TILE) * (edge / OUTPUT_TILE);
-        let Tiles { input_tiles, output_tiles } = tiles;
+        let Working { inputs: input_tiles, output_tiles } = working;
         input_tiles.resize(PLACES * count * inputs, 0.0);
         output_tiles.resize(PLACES * count * outputs, 0.0);
         widest(

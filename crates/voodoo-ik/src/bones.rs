@@ -43,15 +43,11 @@ pub fn bones(body: &Body, model: &ChainModel, margin: f64) -> Vec<Bone> {
 
 /// The trunk: limbs of the chain, and its base, from which several other limbs branch.
 pub fn trunk(body: &Body, model: &ChainModel) -> Vec<Trunk> {
-    let mut found = Vec::new();
     let base = model.links().first().and_then(|link| body.parent(link.limb));
     let links = model.links().iter().enumerate().map(|(index, link)| (Carrier::Link(index), link.limb));
-    for (carrier, limb) in base.map(|limb| (Carrier::Base, limb)).into_iter().chain(links) {
-        if branches(body, limb) {
-            found.push(Trunk { carrier, shape: body.limbs()[limb].shape });
-        }
-    }
-    found
+    let limbs = base.map(|limb| (Carrier::Base, limb)).into_iter().chain(links);
+    let trunk = limbs.filter(|(_, limb)| branches(body, *limb));
+    trunk.map(|(carrier, limb)| Trunk { carrier, shape: body.limbs()[limb].shape }).collect()
 }
 
 fn branches(body: &Body, limb: usize) -> bool {

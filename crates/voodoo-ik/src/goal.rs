@@ -20,12 +20,6 @@ pub enum Aim {
 }
 
 impl Aim {
-    /// The line through `origin` along `direction` (any length but zero).
-    pub fn line(origin: Vec3, direction: Vec3) -> Self {
-        let n = direction.normalize_or_zero();
-        Self::Line { n, m: origin.cross(n) }
-    }
-
     /// The residual of a point at `x`: its offset from the position, or `x x n - m` (R07 eq. 11), whose length is its distance
     /// from the line.
     pub fn residual(&self, x: Vec3) -> Vec3 {
@@ -87,7 +81,7 @@ pub fn level_rows(
         let root = goal.weight.sqrt();
         residual.extend((root * goal.aim.residual(x)).to_array());
         let rows = &mut jacobian[3 * index * n..3 * (index + 1) * n];
-        for &mover in model.movers(goal.link) {
+        for &mover in &model.movers[goal.link] {
             let column = &at.columns[mover];
             let d = root * goal.aim.derivative(column.omega.cross(x) + column.v);
             rows[mover] = d.x;

@@ -73,23 +73,20 @@ impl Criterion<'_> {
                 let (a, b) =
                     (view.camera_from_world.transform_point(ends[0]), view.camera_from_world.transform_point(ends[1]));
                 let mut slopes = [Vec3::ZERO; 2];
-                let mut any_view = false;
                 for t in places() {
                     let radius = segment.radius[0] + t * (segment.radius[1] - segment.radius[0]);
                     let (value, slope) = view.outside(a + t * (b - a), radius, self.thin);
                     if value > 0.0 {
-                        any_view = true;
                         h += value;
                         slopes[0] += (1.0 - t) * slope;
                         slopes[1] += t * slope;
                     }
                 }
-                if !any_view {
-                    continue;
+                if slopes != [Vec3::ZERO; 2] {
+                    let world_from_camera = Mat3::from_quat(view.camera_from_world.rotation).transpose();
+                    forces[0] += world_from_camera * slopes[0];
+                    forces[1] += world_from_camera * slopes[1];
                 }
-                let world_from_camera = Mat3::from_quat(view.camera_from_world.rotation).transpose();
-                forces[0] += world_from_camera * slopes[0];
-                forces[1] += world_from_camera * slopes[1];
             }
             for ((link, _), (x, force)) in segment.ends.iter().zip(ends.iter().zip(forces)) {
                 if force != Vec3::ZERO {
@@ -150,7 +147,7 @@ impl Criterion<'_> {
 /// Adds the derivative by all unknowns that move a link, given a force on it at a world position.
 fn add_force(model: &ChainModel, at: &Kinematics, link: usize, x: Vec3, force: Vec3, gradient: &mut [f64]) {
     let moment = x.cross(force);
-    for &mover in model.movers(link) {
+    for &mover in &model.movers[link] {
         let column = &at.columns[mover];
         gradient[mover] += column.omega.dot(moment) + column.v.dot(force);
     }

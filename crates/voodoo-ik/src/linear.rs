@@ -18,10 +18,6 @@ impl Taken {
         self.n = n;
     }
 
-    pub(crate) fn is_empty(&self) -> bool {
-        self.rows.is_empty()
-    }
-
     /// Projects `row` into the null space.
     pub(crate) fn project(&self, row: &mut [f64]) {
         orthogonalize(&self.rows, row);

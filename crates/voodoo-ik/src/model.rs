@@ -1,9 +1,8 @@
 //! A body, or a part of one, as a chain with exact joints. The unknowns are the vector of joint angles.
 
-use voodoo_core::BodyError;
 use voodoo_core::kinematics::hinge_axis;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
-use voodoo_core::{Body, JointKind, Limb};
+use voodoo_core::{Body, BodyError, JointKind, Limb};
 
 /// Whether the first limb of the chain is among the unknowns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,8 +49,8 @@ pub struct ChainModel {
     links: Vec<Link>,
     names: Vec<String>,
     limits: Vec<[f64; 2]>,
-    /// For every link, the unknowns that move it; and where they start in that list.
-    movers: Vec<Vec<usize>>,
+    /// For every link, the unknowns that move it.
+    pub(super) movers: Vec<Vec<usize>>,
 }
 
 /// Derivative of the world position of a point `x` on any limb distal to the joint: `omega x x + v` for a unit rate of the
@@ -102,40 +101,32 @@ impl ChainModel {
         }
         let free = [f64::NEG_INFINITY, f64::INFINITY];
         let first = self.links.is_empty();
-        let mut link = Link {
-            limb,
-            parent,
-            parent_from_joint: Pose::IDENTITY,
-            joint_from_limb: Pose::IDENTITY,
-            turn: Turn::Rigid,
-            start,
-        };
-        match joint {
+        let (mut parent_from_joint, mut joint_from_limb) = (Pose::IDENTITY, Pose::IDENTITY);
+        let turn = match joint {
             _ if first && root == Root::Free => {
-                link.turn = Turn::Free;
                 self.names.extend(["x", "y", "z", "rx", "ry", "rz"].map(|axis| format!("root_{axis}")));
                 self.limits.extend([free; 6]);
+                Turn::Free
             }
-            None => {}
+            None => Turn::Rigid,
             Some((_, joint)) => {
-                link.parent_from_joint = joint.parent_from_joint;
-                link.joint_from_limb = joint.limb_from_joint.inverse();
+                (parent_from_joint, joint_from_limb) = (joint.parent_from_joint, joint.limb_from_joint.inverse());
                 if joint.kind() == JointKind::Hinge {
                     let axis = hinge_axis(joint);
-                    link.turn = Turn::Hinge(axis);
                     self.names.push(format!("{}_flexion", joint.name));
                     self.limits.push(joint.limits.map_or(free, |limits| limits[usize::from(axis == Vec3::Y)]));
+                    Turn::Hinge(axis)
                 } else {
-                    link.turn = Turn::Ball;
                     self.names.extend(["rx", "ry", "rz"].map(|axis| format!("{}_{axis}", joint.name)));
                     self.limits.extend(joint.limits.unwrap_or([free; 3]));
+                    Turn::Ball
                 }
             }
-        }
+        };
         let mut movers = parent.map_or_else(Vec::new, |parent| self.movers[parent].clone());
         movers.extend(start..self.names.len());
         self.movers.push(movers);
-        self.links.push(link);
+        self.links.push(Link { limb, parent, parent_from_joint, joint_from_limb, turn, start });
         Ok(())
     }
 
@@ -157,11 +148,6 @@ impl ChainModel {
     /// Number of unknowns.
     pub fn freedoms(&self) -> usize {
         self.names.len()
-    }
-
-    /// The unknowns that move a link.
-    pub fn movers(&self, link: usize) -> &[usize] {
-        &self.movers[link]
     }
 
     /// The link of a limb of the body.
@@ -194,9 +180,7 @@ impl ChainModel {
                 }
                 Turn::Free => {
                     let axes = Mat3::from_quat(joint.rotation);
-                    for v in [axes.x_axis, axes.y_axis, axes.z_axis] {
-                        columns.push(Column { omega: Vec3::ZERO, v });
-                    }
+                    columns.extend([axes.x_axis, axes.y_axis, axes.z_axis].map(|v| Column { omega: Vec3::ZERO, v }));
                     let center = joint.translation + joint.rotation * Vec3::new(value[0], value[1], value[2]);
                     let joint = Pose::from_parts(center, joint.rotation);
                     let rotation = ball(Vec3::new(value[3], value[4], value[5]), &joint, columns);

@@ -17,20 +17,16 @@ pub fn read(body: &Body, model: &ChainModel, world_from_base: &Pose, poses: &[Po
     for link in model.links() {
         let joint: Option<&(usize, Joint)> = body.limbs()[link.limb].parent.as_ref();
         let world_from_limb = &poses[link.limb];
+        let turned = joint.map(|(parent, joint)| rotation_vector(joint_turn(joint, &poses[*parent], world_from_limb)));
         let value = &mut angles[link.start..];
-        match (link.turn, joint) {
+        match (link.turn, turned) {
             (Turn::Free, _) => {
                 let pose = world_from_base.inv_mul(world_from_limb);
                 value[..3].copy_from_slice(&pose.translation.to_array());
                 value[3..6].copy_from_slice(&rotation_vector(pose.rotation).to_array());
             }
-            (Turn::Hinge(axis), Some((parent, joint))) => {
-                value[0] = rotation_vector(joint_turn(joint, &poses[*parent], world_from_limb)).dot(axis);
-            }
-            (Turn::Ball, Some((parent, joint))) => {
-                let v = rotation_vector(joint_turn(joint, &poses[*parent], world_from_limb));
-                value[..3].copy_from_slice(&v.to_array());
-            }
+            (Turn::Hinge(axis), Some(turned)) => value[0] = turned.dot(axis),
+            (Turn::Ball, Some(turned)) => value[..3].copy_from_slice(&turned.to_array()),
             _ => {}
         }
     }

@@ -23,6 +23,12 @@ fn arm() -> (Body, ChainModel) {
     (body, model)
 }
 
+/// The line through `origin` along `direction`.
+fn line(origin: Vec3, direction: Vec3) -> Aim {
+    let n = direction.normalize();
+    Aim::Line { n, m: origin.cross(n) }
+}
+
 fn goal(body: &Body, model: &ChainModel, site: &str, aim: Aim, level: usize) -> Goal {
     let site = &body.sites()[body.site_index(site).unwrap()];
     Goal { link: model.link_of(site.limb).unwrap(), point: site.position, aim, weight: 1.0, level }
@@ -75,7 +81,7 @@ proptest! {
         let angles = &angles[..model.freedoms()];
         let site = &body.sites()[site % body.sites().len()];
         let aim = if kind {
-            Aim::line(Vec3::new(0.3, -0.2, 0.9), Vec3::new(0.2, 1.0, -0.4))
+            line(Vec3::new(0.3, -0.2, 0.9), Vec3::new(0.2, 1.0, -0.4))
         } else {
             Aim::Position(Vec3::new(0.1, 0.2, 0.3))
         };
@@ -175,7 +181,7 @@ proptest! {
         let (x, p) = (Vec3::new(x[0], x[1], x[2]), Vec3::new(p[0], p[1], p[2]));
         let d = Vec3::new(d[0], d[1], d[2]).try_normalize().unwrap_or(Vec3::Z);
         // R07 eq. 13: three rows of the twist.
-        let aim = Aim::line(p, d);
+        let aim = line(p, d);
         let residual = aim.residual(x);
         let jacobian = Matrix3x6::from_fn(|axis, i| {
             let e = Vec3::AXES[i % 3];

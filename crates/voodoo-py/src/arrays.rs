@@ -2,10 +2,8 @@
 
 use std::convert::Infallible;
 
-use numpy::ndarray::Dimension;
 use numpy::{
-    Element, Ix2, Ix3, PyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray, PyReadonlyArray2,
-    PyUntypedArray, PyUntypedArrayMethods,
+    PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 use pyo3::type_object::PyTypeInfo;
@@ -14,63 +12,32 @@ use voodoo_core::{Body, ColorPixels, DepthPixels, Limb, PointSlice};
 
 use crate::errors::{MeasurementError, wrong_argument};
 
-/// An array of the caller that may have either of two types, contiguous and aligned.
-pub(crate) enum EitherArray<T, D, U, E> {
-    First(Py<PyArray<T, D>>),
-    Second(Py<PyArray<U, E>>),
+/// A borrow of points `(N, 3)`, contiguous and aligned.
+#[derive(FromPyObject)]
+pub(crate) enum PointView<'py> {
+    Single(PyReadonlyArray2<'py, f32>),
+    Double(PyReadonlyArray2<'py, f64>),
 }
 
-/// A borrow of an [`EitherArray`].
-pub(crate) enum EitherView<'py, T: Element, D: Dimension, U: Element, E: Dimension> {
-    First(PyReadonlyArray<'py, T, D>),
-    Second(PyReadonlyArray<'py, U, E>),
+/// A borrow of a depth image `(height, width)`, contiguous and aligned.
+#[derive(FromPyObject)]
+pub(crate) enum DepthView<'py> {
+    Units(PyReadonlyArray2<'py, u16>),
+    Float(PyReadonlyArray2<'py, f32>),
 }
 
-/// Points `(N, 3)`: single or double precision.
-pub(crate) type PointArray = EitherArray<f32, Ix2, f64, Ix2>;
-/// A depth image `(height, width)`.
-pub(crate) type DepthArray = EitherArray<u16, Ix2, f32, Ix2>;
-/// An image `(height, width, 3)` or `(height, width)`.
-pub(crate) type ColorArray = EitherArray<u8, Ix3, u8, Ix2>;
-pub(crate) type PointView<'py> = EitherView<'py, f32, Ix2, f64, Ix2>;
-pub(crate) type DepthView<'py> = EitherView<'py, u16, Ix2, f32, Ix2>;
-pub(crate) type ColorView<'py> = EitherView<'py, u8, Ix3, u8, Ix2>;
-
-impl<T: Element, D: Dimension, U: Element, E: Dimension> EitherArray<T, D, U, E> {
-    /// The array; copied only where it is not contiguous and aligned. None of another type.
-    pub(crate) fn cast(value: &Bound<'_, PyAny>) -> Option<Self> {
-        let array = contiguous(value).ok()?;
-        let first = array.cast::<PyArray<T, D>>().map(|array| Self::First(array.clone().unbind()));
-        first.or_else(|_| array.cast::<PyArray<U, E>>().map(|array| Self::Second(array.clone().unbind()))).ok()
-    }
-
-    pub(crate) fn view<'py>(&self, py: Python<'py>) -> EitherView<'py, T, D, U, E> {
-        match self {
-            Self::First(array) => EitherView::First(array.bind(py).readonly()),
-            Self::Second(array) => EitherView::Second(array.bind(py).readonly()),
-        }
-    }
-}
-
-impl PointArray {
-    /// Takes an `(N, 3)` array of float32 or float64 without a mask.
-    pub(crate) fn new(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let expected = "an array of shape (N, 3) and dtype float32 or float64";
-        let wrong = |found: &Bound<'_, PyAny>| wrong_argument(name, expected, found);
-        let array = value.cast::<PyUntypedArray>().map_err(|_| wrong(&value.get_type()))?;
-        if array.ndim() != 2 || array.shape()[1] != 3 {
-            return Err(wrong(value));
-        }
-        unmasked(name, value, "leave the masked rows out: points.data[~numpy.ma.getmaskarray(points).any(axis=1)]")?;
-        Self::cast(value).ok_or_else(|| wrong(value))
-    }
+/// A borrow of an image `(height, width, 3)` or `(height, width)`, contiguous and aligned.
+#[derive(FromPyObject)]
+pub(crate) enum ColorView<'py> {
+    Color(PyReadonlyArray3<'py, u8>),
+    Gray(PyReadonlyArray2<'py, u8>),
 }
 
 impl PointView<'_> {
     pub(crate) fn points(&self) -> PyResult<PointSlice<'_>> {
         Ok(match self {
-            Self::First(view) => PointSlice::F32(view.as_slice()?.as_chunks().0),
-            Self::Second(view) => PointSlice::F64(view.as_slice()?.as_chunks().0),
+            Self::Single(view) => PointSlice::F32(view.as_slice()?.as_chunks().0),
+            Self::Double(view) => PointSlice::F64(view.as_slice()?.as_chunks().0),
         })
     }
 }
@@ -78,28 +45,46 @@ impl PointView<'_> {
 impl DepthView<'_> {
     pub(crate) fn pixels(&self) -> PyResult<DepthPixels<'_>> {
         Ok(match self {
-            Self::First(view) => DepthPixels::U16(view.as_slice()?),
-            Self::Second(view) => DepthPixels::F32(view.as_slice()?),
+            Self::Units(view) => DepthPixels::U16(view.as_slice()?),
+            Self::Float(view) => DepthPixels::F32(view.as_slice()?),
         })
-    }
-}
-
-impl ColorArray {
-    /// Takes an image of dtype uint8, and its height and width.
-    pub(crate) fn new(image: &Bound<'_, PyAny>) -> Option<(Self, [usize; 2])> {
-        let shape = image.cast::<PyUntypedArray>().ok()?.shape();
-        let ([height, width] | [height, width, 3]) = *shape else { return None };
-        Some((Self::cast(image)?, [height, width]))
     }
 }
 
 impl ColorView<'_> {
     pub(crate) fn pixels(&self) -> PyResult<ColorPixels<'_>> {
         Ok(match self {
-            Self::First(view) => ColorPixels::Color(view.as_slice()?.as_chunks().0),
-            Self::Second(view) => ColorPixels::Gray(view.as_slice()?),
+            Self::Color(view) => ColorPixels::Color(view.as_slice()?.as_chunks().0),
+            Self::Gray(view) => ColorPixels::Gray(view.as_slice()?),
         })
     }
+}
+
+/// The array, copied only where it is not contiguous and aligned. None where `View` is no borrow of it.
+pub(crate) fn viewable<'py, View>(value: &Bound<'py, PyAny>) -> Option<Bound<'py, PyAny>>
+where
+    View: for<'a> FromPyObject<'a, 'py>,
+{
+    contiguous(value).ok().filter(|array| array.extract::<View>().is_ok())
+}
+
+/// An `(N, 3)` array of float32 or float64 without a mask, for a [`PointView`].
+pub(crate) fn points<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let expected = "an array of shape (N, 3) and dtype float32 or float64";
+    let wrong = |found: &Bound<'_, PyAny>| wrong_argument(name, expected, found);
+    let array = value.cast::<PyUntypedArray>().map_err(|_| wrong(&value.get_type()))?;
+    if array.ndim() != 2 || array.shape()[1] != 3 {
+        return Err(wrong(value));
+    }
+    unmasked(name, value, "leave the masked rows out: points.data[~numpy.ma.getmaskarray(points).any(axis=1)]")?;
+    viewable::<PointView>(value).ok_or_else(|| wrong(value))
+}
+
+/// An image of dtype uint8, for a [`ColorView`], and its height and width.
+pub(crate) fn picture<'py>(image: &Bound<'py, PyAny>) -> Option<(Bound<'py, PyAny>, [usize; 2])> {
+    let shape = image.cast::<PyUntypedArray>().ok()?.shape();
+    let ([height, width] | [height, width, 3]) = *shape else { return None };
+    Some((viewable::<ColorView>(image)?, [height, width]))
 }
 
 /// A vector that becomes an array (3,).
@@ -144,6 +129,11 @@ pub(crate) fn rows<'a, const N: usize>(name: &str, array: &'a PyReadonlyArray2<'
     }
     let text = format!("{name}: expected shape (N, {N}), found {:?}", array.shape());
     Err(MeasurementError::new_err(text))
+}
+
+/// Rows of vectors.
+pub(crate) fn vectors(name: &str, array: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Vec3>> {
+    Ok(rows(name, array)?.iter().map(|place| Vec3::from_array(*place)).collect())
 }
 
 /// The entries of a C-contiguous array of double precision with the given shape; `None` for anything else, including masked

@@ -1,12 +1,11 @@
 //! `Body`: created by `voodoo.model.body` from validated parts.
 
 use pyo3::prelude::*;
-use voodoo_core::Body;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
-use voodoo_core::{HumanModel, Joint, Limb, Site};
+use voodoo_core::{Body, HumanModel, Joint, Limb, Site};
 
 use crate::arrays::{Array, frozen};
-use crate::errors::{BodyError, Raise};
+use crate::errors::{BodyError, raise};
 use crate::shape::PyShape;
 
 /// A rotation as Python represents it.
@@ -109,7 +108,7 @@ impl PyBody {
                 })
             })
             .collect::<PyResult<Vec<_>>>()?;
-        Body::new(name, limbs, sites).map(Self).map_err(Raise::raise)
+        Body::new(name, limbs, sites).map(Self).map_err(raise)
     }
 
     #[staticmethod]
@@ -119,26 +118,16 @@ impl PyBody {
             let text = format!("model: expected \"measured\", \"full\" or \"papers\", found {model:?}");
             BodyError::new_err(text)
         })?;
-        Body::human(stature, found.1).map(Self).map_err(Raise::raise)
+        Body::human(stature, found.1).map(Self).map_err(raise)
     }
 
     fn scaled(&self, factor: f64) -> PyResult<Self> {
-        self.0.scaled(factor).map(Self).map_err(Raise::raise)
+        self.0.scaled(factor).map(Self).map_err(raise)
     }
 
     /// The parts that `new` takes, rotations as vectors.
     fn parts(&self) -> (String, Vec<LimbParts>, Vec<SiteParts>) {
         self.parts_with(readable)
-    }
-
-    #[doc = stub!("Body.sizes")]
-    fn sizes<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
-        let limbs = self.0.limbs();
-        let sizes = |limb: &Limb| {
-            let shape = &limb.shape;
-            [shape.length(), shape.a0(), shape.b0(), shape.a1(), shape.b1()]
-        };
-        frozen(py, limbs.iter().flat_map(sizes).collect(), &[limbs.len(), 5])
     }
 
     #[doc = stub!("Body.at_rest")]

@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use voodoo_core::math::Pose;
-use voodoo_core::{Body, Camera};
-use voodoo_core::{Cloud, ColorImage, DepthImage, DetectedPerson, Frame, PositionRelation, RayRelation, Scope};
+use voodoo_core::{
+    Body, Camera, Cloud, ColorImage, DepthImage, DetectedPerson, Frame, PositionRelation, RayRelation, Scope,
+};
 
-use crate::arrays::{ColorArray, ColorView, DepthArray, DepthView, PointArray, PointView};
-use crate::errors::Raise;
+use crate::arrays::{ColorView, DepthView, PointView};
+use crate::errors::raise;
 use crate::frame::PyFrame;
 
 /// Index of a name in a list, which it joins if it is new.
@@ -21,15 +22,16 @@ pub(crate) fn number(names: &mut Vec<String>, name: &str) -> u16 {
     number as u16
 }
 
-/// A cloud, whose points are in the array, and the name of the limb that they are on.
-pub(crate) type CloudData = (PointArray, Cloud<'static>, Option<String>);
+/// A cloud, whose points are those of a [`PointView`] of the array, and the name of the limb that they are on.
+pub(crate) type CloudData = (Py<PyAny>, Cloud<'static>, Option<String>);
 /// A measured position, and the name of its site, whose index is not known yet.
 pub(crate) type PositionData = (String, PositionRelation);
 /// A ray, and the name of its site, whose index is not known yet.
 pub(crate) type RayData = (String, RayRelation);
 
 pub(crate) struct ImageData {
-    pub pixels: DepthArray,
+    /// An array for a [`DepthView`].
+    pub pixels: Py<PyAny>,
     pub camera: Arc<Camera>,
     pub meters_per_unit: f64,
     pub world_from_sensor: Pose,
@@ -38,7 +40,8 @@ pub(crate) struct ImageData {
 }
 
 pub(crate) struct ColorData {
-    pub pixels: ColorArray,
+    /// An array for a [`ColorView`].
+    pub pixels: Py<PyAny>,
     pub camera: Arc<Camera>,
     pub world_from_sensor: Pose,
     pub stamp: f64,
@@ -59,16 +62,21 @@ pub(crate) fn depth_images<'a>(views: &'a DepthViews) -> PyResult<Vec<DepthImage
     views.iter().map(image).collect()
 }
 
-/// A color image as one of the camera with this index.
-pub(crate) fn color_image<'a>((view, data): &'a (ColorView, &ColorData), number: u16) -> PyResult<ColorImage<'a>> {
-    let ColorData { ref camera, world_from_sensor, stamp, source, .. } = **data;
-    Ok(ColorImage { pixels: view.pixels()?, camera, world_from_sensor, stamp, number, source })
+/// The color images of these views, of the cameras with these indices.
+pub(crate) fn color_images<'a>(views: &'a ColorViews, cameras: &[u16]) -> PyResult<Vec<ColorImage<'a>>> {
+    let image = |((view, data), number): (&'a (ColorView, &ColorData), &u16)| {
+        let ColorData { ref camera, world_from_sensor, stamp, source, .. } = **data;
+        Ok(ColorImage { pixels: view.pixels()?, camera, world_from_sensor, stamp, number: *number, source })
+    };
+    views.iter().zip(cameras).map(image).collect()
 }
 
 /// Everything a step borrows: the views keep the arrays alive and readable.
 pub(crate) struct Borrowed<'py, 'a> {
+    held: &'a PyFrame,
     clouds: Vec<(PointView<'py>, Cloud<'static>)>,
-    pub(crate) images: DepthViews<'py, 'a>,
+    images: DepthViews<'py, 'a>,
+    colors: ColorViews<'py, 'a>,
     positions: Vec<PositionRelation>,
     rays: Vec<RayRelation>,
     detections: Vec<(Vec<PositionRelation>, f64)>,
@@ -78,11 +86,11 @@ impl<'py, 'a> Borrowed<'py, 'a> {
     /// Borrows the arrays of a frame and looks the names up in `body`. The frame's sources are numbered from `first`.
     pub(crate) fn new(py: Python<'py>, frame: &'a PyFrame, body: &Body, first: usize) -> PyResult<Self> {
         let first = first as u16;
-        let index = |name: &str| body.site_index(name).map_err(Raise::raise);
+        let index = |name: &str| body.site_index(name).map_err(raise);
         let cloud = |(points, cloud, limb): &'a CloudData| {
-            let limb = limb.as_ref().map(|name| body.limb_index(name)).transpose().map_err(Raise::raise)?;
+            let limb = limb.as_ref().map(|name| body.limb_index(name)).transpose().map_err(raise)?;
             let (scope, source) = (limb.map_or(cloud.scope, Scope::Limb), cloud.source + first);
-            Ok((points.view(py), Cloud { scope, source, ..*cloud }))
+            Ok((points.extract(py)?, Cloud { scope, source, ..*cloud }))
         };
         let position =
             |(name, of): &PositionData| Ok(PositionRelation { site: index(name)?, source: of.source + first, ..*of });
@@ -94,36 +102,31 @@ impl<'py, 'a> Borrowed<'py, 'a> {
         let rays = frame.rays.iter().map(ray).collect::<PyResult<_>>()?;
         let clouds = frame.clouds.iter().map(cloud).collect::<PyResult<_>>()?;
         let detections = frame.detections.iter().map(person).collect::<PyResult<_>>()?;
-        Ok(Self { clouds, images: frame.depth_views(py), positions, rays, detections })
+        let (images, colors) = (frame.depth_views(py)?, frame.color_views(py)?);
+        Ok(Self { held: frame, clouds, images, colors, positions, rays, detections })
     }
 
-    pub(crate) fn clouds(&self) -> PyResult<Vec<Cloud<'_>>> {
+    fn clouds(&self) -> PyResult<Vec<Cloud<'_>>> {
         self.clouds.iter().map(|(view, cloud)| Ok(Cloud { points: view.points()?, ..*cloud })).collect()
     }
 
-    /// The detected persons.
-    pub(crate) fn detections(&self) -> Vec<DetectedPerson<'_>> {
-        self.detections.iter().map(|(positions, person)| DetectedPerson { positions, person: *person }).collect()
-    }
-
-    /// The frame of these views and of what was borrowed with them from `held`.
-    pub(crate) fn frame<'b>(
-        &'b self,
-        held: &'b PyFrame,
-        clouds: &'b [Cloud<'b>],
-        images: &'b [DepthImage<'b>],
-        colors: &'b [ColorImage<'b>],
-        detections: &'b [DetectedPerson<'b>],
-    ) -> Frame<'b> {
-        Frame::empty(held.stamp)
-            .with_clouds(clouds)
-            .with_images(images)
-            .with_colors(colors)
+    /// What a function makes of the frame, whose color images are of the cameras with these indices.
+    pub(crate) fn with_frame<T>(&self, cameras: &[u16], then: impl FnOnce(&Frame) -> PyResult<T>) -> PyResult<T> {
+        let (clouds, images, colors) =
+            (self.clouds()?, depth_images(&self.images)?, color_images(&self.colors, cameras)?);
+        let detections = self.detections.iter();
+        let detections: Vec<_> =
+            detections.map(|(positions, person)| DetectedPerson { positions, person: *person }).collect();
+        let frame = Frame::empty(self.held.stamp)
+            .with_clouds(&clouds)
+            .with_images(&images)
+            .with_colors(&colors)
             .with_positions(&self.positions)
             .with_rays(&self.rays)
-            .with_detections(detections)
-            .with_ground(held.ground)
-            .with_excluded(&held.excluded)
+            .with_detections(&detections)
+            .with_ground(self.held.ground)
+            .with_excluded(&self.held.excluded);
+        then(&frame)
     }
 }
 

@@ -7,9 +7,9 @@ use pyo3::prelude::*;
 use voodoo_core::math::{Affine3, Vec3};
 use voodoo_core::{Camera, Lens, Rendering, Viewpoint};
 
-use crate::arrays::{limb_poses, pose, rows};
+use crate::arrays::{Array, array, limb_poses, pose, rows};
 use crate::body::PyBody;
-use crate::errors::{MeasurementError, Raise, wrong_argument};
+use crate::errors::{CameraError, MeasurementError, raise, wrong_argument};
 
 type Arguments = (usize, usize, [f64; 4], String, Vec<f64>);
 
@@ -23,7 +23,7 @@ impl PyCamera {
     fn new(width: usize, height: usize, intrinsics: [f64; 4], model: String, coefficients: Vec<f64>) -> PyResult<Self> {
         let camera = Lens::from_model(&model, &coefficients)
             .and_then(|lens| Camera::new(width, height, intrinsics, lens))
-            .map_err(Raise::raise)?;
+            .map_err(|error| CameraError::new_err(error.to_string()))?;
         Ok(Self(Arc::new(camera)))
     }
 
@@ -34,18 +34,20 @@ impl PyCamera {
     }
 
     #[doc = stub!("Camera.project")]
-    fn project<'py>(&self, points: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn project<'py>(&self, points: PyReadonlyArray2<'py, f64>) -> PyResult<Array<'py>> {
         let pixel = |[x, y, z]: &[f64; 3]| {
             let before = x.is_finite() && y.is_finite() && z.is_finite() && *z > 0.0;
             before.then(|| self.0.pixel([x / z, y / z])).flatten().unwrap_or([f64::NAN; 2])
         };
-        pairs(points.py(), rows("points", &points)?.iter().map(pixel))
+        let rows = rows("points", &points)?;
+        array(points.py(), rows.iter().flat_map(pixel).collect(), &[rows.len(), 2])
     }
 
     #[doc = stub!("Camera.undistorted")]
-    fn undistorted<'py>(&self, pixels: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn undistorted<'py>(&self, pixels: PyReadonlyArray2<'py, f64>) -> PyResult<Array<'py>> {
         let ray = |pixel: &[f64; 2]| self.0.ray(*pixel).unwrap_or([f64::NAN; 2]);
-        pairs(pixels.py(), rows("pixels", &pixels)?.iter().map(ray))
+        let rows = rows("pixels", &pixels)?;
+        array(pixels.py(), rows.iter().flat_map(ray).collect(), &[rows.len(), 2])
     }
 
     #[doc = stub!("Camera.rays")]
@@ -53,11 +55,6 @@ impl PyCamera {
         let rays = py.detach(|| self.0.rays());
         PyArray1::from_slice(py, rays.as_flattened()).reshape([self.0.height(), self.0.width(), 2])
     }
-}
-
-fn pairs<'py>(py: Python<'py>, found: impl ExactSizeIterator<Item = [f64; 2]>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let count = found.len();
-    PyArray1::from_vec(py, found.flatten().collect()).reshape([count, 2])
 }
 
 /// The core's camera of a `voodoo.Camera`.
@@ -96,7 +93,7 @@ pub(crate) fn render_depth<'py>(
     let world_from_sensor = pose("world_from_sensor", world_from_sensor)?;
     let view = Viewpoint { camera: &camera, world_from_sensor };
     let mut image = Rendering::default();
-    py.detach(|| image.render(&body.0, &poses, &view, None)).map_err(Raise::raise)?;
+    py.detach(|| image.render(&body.0, &poses, &view, None)).map_err(raise)?;
     let size = [camera.height(), camera.width()];
     let depth = PyArray1::from_slice(py, image.depth()).reshape(size)?;
     // The mark of no limb, all ones, becomes -1; no body has 32768 limbs.

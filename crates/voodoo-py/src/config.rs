@@ -2,10 +2,9 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use voodoo_core::Config;
-use voodoo_core::{RawValue, Value};
+use voodoo_core::{Config, RawValue, Value};
 
-use crate::errors::{ConfigError, Raise};
+use crate::errors::ConfigError;
 
 /// One row an entry: name, documentation, unit, default, (least, greatest) or None, words to choose from.
 type FieldRow<'py> = (&'static str, String, &'static str, Bound<'py, PyAny>, Option<(f64, f64)>, Vec<&'static str>);
@@ -38,7 +37,7 @@ pub(crate) fn config(values: &Bound<'_, PyDict>) -> PyResult<Config> {
         let raw = value.extract().map(RawValue::Switch).or_else(number).or_else(word);
         let wrong = || format!("{key}: expected a number, a switch or a word, found {value}");
         let raw = raw.map_err(|_: PyErr| ConfigError::new_err(wrong()))?;
-        config.set(&key, &raw).map_err(Raise::raise)?;
+        config.set(&key, &raw).map_err(|error| ConfigError::new_err(error.to_string()))?;
     }
     Ok(config)
 }

@@ -1,17 +1,16 @@
 //! Detection of people in depth images.
 
-use std::sync::Arc;
-
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict};
-use voodoo_core::HumanModel;
 use voodoo_core::math::{Pose, Vec3};
-use voodoo_core::{Body, Camera, Frame};
-use voodoo_core::{DepthImage, DepthPixels, Ground};
-use voodoo_core::{Detect, DetectError, Detection, DetectionQuery, Surroundings};
+use voodoo_core::{
+    Body, Camera, DepthImage, DepthPixels, Detect, DetectError, Detection, DetectionQuery, Frame, Ground, HumanModel,
+    Surroundings,
+};
 use voodoo_detect::crop::SIZE;
 use voodoo_detect::segmentation::Segmentation;
 use voodoo_detect::{Detector, JOINTS, LENGTHS};
@@ -19,7 +18,7 @@ use voodoo_detect::{Detector, JOINTS, LENGTHS};
 use crate::arrays::{Row, contiguous, vector};
 use crate::borrowed::depth_images;
 use crate::camera::camera_of;
-use crate::errors::{ConfigError, MeasurementError, Raise, wrong_argument};
+use crate::errors::{ConfigError, MeasurementError, raise, wrong_argument};
 use crate::frame::PyFrame;
 
 #[doc = stub!("Detector")]
@@ -31,7 +30,7 @@ impl PyDetector {
     #[new]
     #[pyo3(signature = (*, weights=None, stature=None, stature_sigma=0.02))]
     fn new(weights: Option<PathBuf>, stature: Option<f64>, stature_sigma: f64) -> PyResult<Self> {
-        let detector = weights.map_or_else(|| Ok(Detector::new()), Self::with_weights)?;
+        let detector = weights.map_or_else(|| Ok(Detector::new()), with_weights)?;
         let Some(stature) = stature else { return Ok(Self(detector)) };
         if !((0.3..=3.0).contains(&stature) && stature_sigma > 0.0 && stature_sigma.is_finite()) {
             let expected = "meters from 0.3 to 3.0, and a relative standard deviation above 0";
@@ -44,12 +43,12 @@ impl PyDetector {
     #[doc = stub!("Detector.detect")]
     #[pyo3(signature = (frame, *, up=None))]
     fn detect(&mut self, py: Python<'_>, frame: &PyFrame, up: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<PyDetection>> {
-        let any = Body::human(1.75, HumanModel::Full).map_err(Raise::raise)?;
-        let views = frame.depth_views(py);
+        let any = Body::human(1.75, HumanModel::Full).map_err(raise)?;
+        let views = frame.depth_views(py)?;
         let images = depth_images(&views)?;
         let input =
             Frame::empty(frame.stamp).with_images(&images).with_ground(frame.ground).with_excluded(&frame.excluded);
-        input.check(&any, None).map_err(Raise::raise)?;
+        input.check(&any, None).map_err(raise)?;
         let direction = |up: &Bound<'_, PyAny>| {
             let wrong = || wrong_argument("up", "a vector that is not zero", up);
             vector("up", up)?.try_normalize().ok_or_else(wrong)
@@ -77,13 +76,11 @@ impl PyDetector {
     }
 }
 
-impl PyDetector {
-    fn with_weights(path: PathBuf) -> PyResult<Detector> {
-        let refused = |found: String| MeasurementError::new_err(format!("{}: {found}", path.display()));
-        let bytes =
-            std::fs::read(&path).map_err(|error| refused(format!("expected a readable file, found {error}")))?;
-        Detector::with_weights(&bytes).map_err(|error| refused(error.to_string()))
-    }
+/// A detector with the network of a file.
+fn with_weights(path: PathBuf) -> PyResult<Detector> {
+    let refused = |found: String| MeasurementError::new_err(format!("{}: {found}", path.display()));
+    let bytes = std::fs::read(&path).map_err(|error| refused(format!("expected a readable file, found {error}")))?;
+    Detector::with_weights(&bytes).map_err(|error| refused(error.to_string()))
 }
 
 #[doc = stub!("Detection")]
@@ -166,8 +163,6 @@ pub(crate) struct PyCandidate {
     middle: [f64; 3],
     #[doc = stub!("PersonCandidate.roll")]
     roll: f64,
-    #[doc = stub!("PersonCandidate.area")]
-    area: f64,
     #[doc = stub!("PersonCandidate.floor")]
     floor: Option<([f64; 3], f64)>,
 }
@@ -210,7 +205,7 @@ pub(crate) fn person_candidates<'py>(
     let mut segmentation = Segmentation::default();
     segmentation.find(&image, &around);
     let (mut found, mut pixels) = (Vec::new(), Vec::new());
-    for candidate in segmentation.candidates().iter().take(most) {
+    for candidate in segmentation.candidates.iter().take(most) {
         let Some(crop) = segmentation.crop(candidate, enlarged) else { continue };
         segmentation.mask(candidate, &mut pixels);
         let channels: Vec<f32> = (0..2).flat_map(|c| crop.pixels.iter().map(move |pixel| pixel[c])).collect();
@@ -219,8 +214,7 @@ pub(crate) fn person_candidates<'py>(
             mask: mask(py, &camera, &pixels)?,
             middle: crop.middle,
             roll: crop.roll,
-            area: candidate.area,
-            floor: segmentation.floor().map(|floor| (floor.normal.to_array(), floor.offset)),
+            floor: segmentation.floor.map(|floor| (floor.normal.to_array(), floor.offset)),
         });
     }
     Ok(found)

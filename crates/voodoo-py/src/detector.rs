@@ -9,11 +9,10 @@ use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
 use voodoo_core::math::{Vec3, matrix};
-use voodoo_core::{DepthImage, Ground};
-use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
+use voodoo_core::{DepthImage, Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Ground, Surroundings};
 
 use crate::arrays::{Row, contiguous, vector};
-use crate::errors::{ConfigError, MeasurementError, wrong_argument};
+use crate::errors::{ConfigError, MeasurementError, wrong, wrong_argument};
 
 /// Standard deviation of a joint for which a detector reports none, meters.
 const SIGMA: f64 = 0.05;
@@ -26,33 +25,23 @@ pub(crate) fn detector(given: &Bound<'_, PyAny>) -> PyResult<Option<Box<dyn Dete
         return Ok(None);
     }
     if given.cast::<PyString>().is_ok_and(|word| word == "shipped") {
-        return Ok(shipped());
+        return Ok(Some(Box::new(voodoo_detect::Detector::new())));
     }
-    #[cfg(feature = "detect")]
     if let Ok(detector) = given.cast::<crate::detect::PyDetector>() {
         return Ok(Some(detector.try_borrow()?.0.fresh()));
     }
     if given.hasattr("joints")? && given.hasattr("detect")? {
         return Ok(Some(Box::new(PythonDetector::new(given)?)));
     }
-    let text = format!(
-        "detector: expected \"shipped\", None, a voodoo.Detector, or an object with joints and detect(image), found {}",
-        given.repr()?
-    );
-    Err(ConfigError::new_err(text))
+    let expected = "\"shipped\", None, a voodoo.Detector, or an object with joints and detect(image)";
+    Err(ConfigError::new_err(wrong("detector", expected, given)))
 }
 
-/// The detector that ships with the library, if this build contains it.
-fn shipped() -> Option<Box<dyn Detect>> {
-    #[cfg(feature = "detect")]
-    return Some(Box::new(voodoo_detect::Detector::new()));
-    #[cfg(not(feature = "detect"))]
-    None
-}
-
-/// Reports that a detector failed in a step, which continued without it: a warning, or KeyboardInterrupt and the like unchanged.
-pub(crate) fn warn_of_detector(py: Python<'_>, error: Option<&DetectError>) -> PyResult<()> {
+/// Counts and reports that a detector failed in a step, which continued without it: a warning, or KeyboardInterrupt and the like
+/// unchanged.
+pub(crate) fn warn_of_detector(py: Python<'_>, error: Option<&DetectError>, failures: &mut usize) -> PyResult<()> {
     let Some(error) = error else { return Ok(()) };
+    *failures += 1;
     let cause = error.downcast_ref::<PyErr>();
     if let Some(cause) = cause.filter(|cause| !cause.is_instance_of::<PyException>(py)) {
         return Err(cause.clone_ref(py));
@@ -77,11 +66,8 @@ impl PythonDetector {
     fn new(object: &Bound<'_, PyAny>) -> PyResult<Self> {
         let names = |attribute: &str| -> PyResult<Vec<String>> {
             let Some(found) = object.getattr_opt(attribute)? else { return Ok(Vec::new()) };
-            found.extract().map_err(|_| {
-                let found = found.repr().map_or_else(|_| "something else".into(), |text| text.to_string());
-                let text = format!("detector.{attribute}: expected a sequence of names, found {found}");
-                ConfigError::new_err(text)
-            })
+            let name = format!("detector.{attribute}");
+            found.extract().map_err(|_| ConfigError::new_err(wrong(&name, "a sequence of names", &found)))
         };
         Ok(Self { joints: names("joints")?, lengths: names("lengths")?, object: Arc::new(object.clone().unbind()) })
     }
@@ -206,8 +192,7 @@ where
 {
     let Some(found) = given(person, attribute)? else { return Ok(HashMap::new()) };
     let pairs = found.py().get_type::<PyDict>().call1((&found,));
-    let found_pairs = pairs.and_then(|pairs| pairs.extract());
-    found_pairs.map_err(|_| wrong_argument(attribute, "a mapping from names", &found))
+    pairs.and_then(|pairs| pairs.extract()).map_err(|_| wrong_argument(attribute, "a mapping from names", &found))
 }
 
 /// An attribute; none where it is missing or None.
@@ -226,10 +211,9 @@ fn of_each(person: &Bound<'_, PyAny>, attribute: &str, default: f64) -> PyResult
 /// Log odds of an attribute that is a probability, or None.
 fn log_odds(person: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Option<f64>> {
     let Some(found) = given(person, attribute)? else { return Ok(None) };
+    let wrong = || wrong_argument(attribute, "a probability, from 0 to 1", &found);
     let probability = found.extract::<f64>().ok().filter(|value| (0.0..=1.0).contains(value));
-    let probability = probability
-        .ok_or_else(|| wrong_argument(attribute, "a probability, from 0 to 1", &found))?
-        .clamp(LEAST, 1.0 - LEAST);
+    let probability = probability.ok_or_else(wrong)?.clamp(LEAST, 1.0 - LEAST);
     Ok(Some((probability / (1.0 - probability)).ln()))
 }
 

@@ -1,47 +1,20 @@
 //! Core errors become the exceptions of `voodoo.errors`.
 
-use std::fmt::Display;
-
 use numpy::{PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::import_exception;
 use pyo3::prelude::*;
+use voodoo_core::TrackError;
 
 import_exception!(voodoo.errors, BodyError);
 import_exception!(voodoo.errors, CameraError);
 import_exception!(voodoo.errors, ConfigError);
 import_exception!(voodoo.errors, MeasurementError);
 
-/// Translation of a core error; a trait because both types are foreign here.
-pub(crate) trait Raise: Display + Sized {
-    /// Its exception.
-    const NEW: fn(String) -> PyErr;
-
-    fn raise(self) -> PyErr {
-        Self::NEW(self.to_string())
-    }
-}
-
-impl Raise for voodoo_core::BodyError {
-    const NEW: fn(String) -> PyErr = BodyError::new_err;
-}
-
-impl Raise for voodoo_core::CameraError {
-    const NEW: fn(String) -> PyErr = CameraError::new_err;
-}
-
-impl Raise for voodoo_core::ShapeError {
-    const NEW: fn(String) -> PyErr = BodyError::new_err;
-}
-
-impl Raise for voodoo_core::ConfigError {
-    const NEW: fn(String) -> PyErr = ConfigError::new_err;
-}
-
-impl Raise for voodoo_core::TrackError {
-    const NEW: fn(String) -> PyErr = MeasurementError::new_err;
-
-    fn raise(self) -> PyErr {
-        if matches!(self, Self::Body(_)) { BodyError::new_err(self.to_string()) } else { Self::NEW(self.to_string()) }
+/// The exception for an error of the core: of its body, or of a measurement.
+pub(crate) fn raise(error: impl Into<TrackError>) -> PyErr {
+    match error.into() {
+        TrackError::Body(error) => BodyError::new_err(error.to_string()),
+        error => MeasurementError::new_err(error.to_string()),
     }
 }
 

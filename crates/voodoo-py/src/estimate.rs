@@ -5,9 +5,8 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyMappingProxy, PyTuple};
 use pythonize::{depythonize, pythonize};
-use voodoo_core::Estimate;
 use voodoo_core::math::{Mat3, Vec3};
-use voodoo_core::{Body, Limb};
+use voodoo_core::{Body, Estimate, Limb};
 
 use crate::arrays::{Array, frozen, matrices};
 use crate::errors::MeasurementError;

@@ -5,12 +5,11 @@ use std::sync::Arc;
 use numpy::{PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use voodoo_core::Camera;
 use voodoo_core::math::Aabb;
-use voodoo_core::{Cloud, Ground, PointSlice, PositionRelation, RayRelation, Scope};
+use voodoo_core::{Camera, Cloud, Ground, PointSlice, PositionRelation, RayRelation, Scope};
 
 use crate::arguments;
-use crate::arrays::{ColorArray, DepthArray, PointArray, Row, pose, unmasked, vector};
+use crate::arrays::{DepthView, Row, picture, points, pose, unmasked, vector, viewable};
 use crate::borrowed::{CloudData, ColorData, ColorViews, DepthViews, ImageData, PositionData, RayData, number};
 use crate::camera::camera_of;
 use crate::errors::{MeasurementError, wrong_argument};
@@ -37,13 +36,13 @@ pub struct PyFrame {
 
 impl PyFrame {
     /// Borrows the depth images.
-    pub(crate) fn depth_views<'py>(&self, py: Python<'py>) -> DepthViews<'py, '_> {
-        self.images.iter().map(|data| (data.pixels.view(py), data)).collect()
+    pub(crate) fn depth_views<'py>(&self, py: Python<'py>) -> PyResult<DepthViews<'py, '_>> {
+        self.images.iter().map(|data| Ok((data.pixels.extract(py)?, data))).collect()
     }
 
     /// Borrows the color images.
-    pub(crate) fn color_views<'py>(&self, py: Python<'py>) -> ColorViews<'py, '_> {
-        self.colors.iter().map(|data| (data.pixels.view(py), data)).collect()
+    pub(crate) fn color_views<'py>(&self, py: Python<'py>) -> PyResult<ColorViews<'py, '_>> {
+        self.colors.iter().map(|data| Ok((data.pixels.extract(py)?, data))).collect()
     }
 
     fn source(&mut self, name: &str) -> u16 {
@@ -54,7 +53,6 @@ impl PyFrame {
 #[pymethods]
 impl PyFrame {
     #[new]
-    #[pyo3(signature = (stamp))]
     fn new(#[pyo3(from_py_with = arguments::stamp)] stamp: f64) -> Self {
         Self { stamp, ..Self::default() }
     }
@@ -70,7 +68,7 @@ impl PyFrame {
         on_body: bool,
         source: &str,
     ) -> PyResult<()> {
-        let array = PointArray::new("points", points)?;
+        let array = self::points("points", points)?.unbind();
         let cloud = Cloud {
             points: PointSlice::F32(&[]),
             world_from_sensor: pose("world_from_sensor", world_from_sensor)?,
@@ -98,7 +96,7 @@ impl PyFrame {
         let wrong = |found: &Bound<'_, PyAny>| wrong_argument("image", expected, found);
         let array = image.cast::<PyUntypedArray>().map_err(|_| wrong(&image.get_type()))?;
         unmasked("image", image, "fill it with 0, which is no return: image.filled(0)")?;
-        let pixels = DepthArray::cast(image).ok_or_else(|| wrong(image))?;
+        let pixels = viewable::<DepthView>(image).ok_or_else(|| wrong(image))?.unbind();
         if array.shape() != [height, width] {
             let text = format!(
                 "image: expected {height} rows of {width} pixels, as its camera has, found shape {:?}",
@@ -131,11 +129,11 @@ impl PyFrame {
         let [height, width] = [camera.height(), camera.width()];
         let expected = format!("an array of shape ({height}, {width}, 3) or ({height}, {width}) and dtype uint8");
         unmasked("image", image, "fill it: image.filled(0)")?;
-        let (pixels, _) = ColorArray::new(image)
+        let (pixels, _) = picture(image)
             .filter(|(_, found)| *found == [height, width])
             .ok_or_else(|| wrong_argument("image", &expected, image))?;
         let data = ColorData {
-            pixels,
+            pixels: pixels.unbind(),
             camera,
             world_from_sensor: pose("world_from_sensor", world_from_sensor)?,
             stamp: stamp.map_or(Ok(self.stamp), arguments::stamp)?,
@@ -221,18 +219,16 @@ impl PyFrame {
         max_weight: f64,
         min_trust: f64,
     ) -> PyResult<usize> {
-        let weight = |sigma: f64| {
-            if sigma > 0.0 && sigma.is_finite() {
-                return Ok((reference_sigma / sigma).powi(2).min(max_weight));
-            }
-            Err(MeasurementError::new_err(format!("sigma: expected finite meters > 0, found {sigma}")))
-        };
-        let trusted = rays.iter().filter(|ray| ray.trust >= min_trust);
         let mut count = 0;
-        for ray in trusted {
-            let (site, source, origin, direction, bias) =
-                (ray.site.clone(), self.source(&ray.source), ray.origin.0, ray.direction.0, ray.bias);
-            let weight = |sigma: f64| Ok::<_, PyErr>(weight(sigma)? * ray.trust);
+        for ray in rays.iter().filter(|ray| ray.trust >= min_trust) {
+            let (site, source, bias) = (ray.site.clone(), self.source(&ray.source), ray.bias);
+            let (origin, direction) = (ray.origin.0, ray.direction.0);
+            let weight = |sigma: f64| {
+                if sigma > 0.0 && sigma.is_finite() {
+                    return Ok((reference_sigma / sigma).powi(2).min(max_weight) * ray.trust);
+                }
+                Err(MeasurementError::new_err(format!("sigma: expected finite meters > 0, found {sigma}")))
+            };
             if let Some(Row(position)) = ray.place {
                 let of = PositionRelation { site: 0, position, weight: weight(ray.place_sigma)?, bias, source };
                 self.positions.push((site.clone(), of));

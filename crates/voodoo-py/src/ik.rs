@@ -12,7 +12,7 @@ use voodoo_ik::{
 
 use crate::arrays::{Array, frozen, limb_poses, matrices, pose};
 use crate::body::PyBody;
-use crate::errors::{BodyError, MeasurementError, Raise};
+use crate::errors::{BodyError, MeasurementError, raise};
 use crate::ik_view::PyView;
 
 /// Angles `(N, n)`; sites `(N, S, 3)`; h, steps, postures tried, those compared with images, and converged as 0 or 1, `(5, N)`; and of
@@ -41,7 +41,7 @@ fn options((steps, tolerance, still, gain, caution, largest_turn): OptionParts) 
 
 impl PyChain {
     fn site(&self, name: &str) -> PyResult<(usize, Vec3)> {
-        let index = self.body.site_index(name).map_err(Raise::raise)?;
+        let index = self.body.site_index(name).map_err(raise)?;
         let site = &self.body.sites()[index];
         self.model.link_of(site.limb).map(|link| (link, site.position)).ok_or_else(|| {
             let known = self.site_names().join(", ");
@@ -73,7 +73,7 @@ impl PyChain {
     fn trunk(&self, others: &[(String, Bound<'_, PyAny>)]) -> PyResult<Vec<Trunk>> {
         let mut found = voodoo_ik::trunk(&self.body, &self.model);
         for (name, world_from_limb) in others {
-            let limb = self.body.limb_index(name).map_err(Raise::raise)?;
+            let limb = self.body.limb_index(name).map_err(raise)?;
             if self.model.link_of(limb).is_some() {
                 let message = format!("others: expected limbs that are not on the chain, found {name:?}");
                 return Err(BodyError::new_err(message));
@@ -112,10 +112,9 @@ impl PyChain {
 impl PyChain {
     #[new]
     fn new(body: &PyBody, limbs: Vec<String>, free_root: bool) -> PyResult<Self> {
-        let indices =
-            limbs.iter().map(|name| body.0.limb_index(name)).collect::<Result<Vec<_>, _>>().map_err(Raise::raise)?;
+        let indices = limbs.iter().map(|name| body.0.limb_index(name)).collect::<Result<Vec<_>, _>>().map_err(raise)?;
         let root = if free_root { Root::Free } else { Root::Fixed };
-        let model = ChainModel::new(&body.0, &indices, root).map_err(Raise::raise)?;
+        let model = ChainModel::new(&body.0, &indices, root).map_err(raise)?;
         Ok(Self { body: body.0.clone(), model })
     }
 

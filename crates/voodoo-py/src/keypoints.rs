@@ -9,9 +9,9 @@ use voodoo_core::math::Vec3;
 use voodoo_sensors::eye::Eye;
 use voodoo_sensors::keypoints::{Sensor, SiteKeypoints, SiteMeasurement, SiteObservation, nearest_person};
 
-use crate::arrays::{PointArray, Row, rows};
+use crate::arrays::{PointView, Row, points, rows};
 use crate::camera::{affine, camera_of};
-use crate::errors::Raise;
+use crate::errors::raise;
 use crate::people::TrackedBody;
 use crate::sites::{ALONG_SIGMA, PySiteGate, PySiteRay, places_of};
 
@@ -50,8 +50,8 @@ impl PyKeypointLayout {
         least: f64,
     ) -> PyResult<Option<usize>> {
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
-        let places = self.places(predicted)?.into_iter().map(|place| place.unwrap_or(Vec3::NAN));
-        let expected: Vec<_> = places.map(|place| eye.pixel(eye.in_sensor(place))).collect();
+        let places = places_of(predicted, self.0.iter().map(|part| &part.site))?.into_iter();
+        let expected: Vec<_> = places.map(|place| eye.pixel(eye.in_sensor(place.unwrap_or(Vec3::NAN)))).collect();
         let people = people.iter().map(|keypoints| rows("keypoints", keypoints)).collect::<PyResult<Vec<_>>>()?;
         Ok(nearest_person(people.into_iter(), &self.0, &expected, least))
     }
@@ -77,7 +77,7 @@ impl PyKeypointLayout {
     ) -> PyResult<Observed> {
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let (sensor, keypoints) = (Sensor { eye, source, noise, place_sigma, stamp }, rows("keypoints", &keypoints)?);
-        let (places, mut gate) = (self.places(predicted)?, gate);
+        let (places, mut gate) = (places_of(predicted, self.0.iter().map(|part| &part.site))?, gate);
         let (mut rays, mut points, mut unseen, mut dropped) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for (part, place) in self.0.iter().zip(places) {
             let Some(found) = part.pixel(keypoints, least) else {
@@ -88,16 +88,9 @@ impl PyKeypointLayout {
                 continue;
             };
             let pixel = (found.pixel[0], found.pixel[1]);
-            let surface: Option<f64> = match surface {
-                Some(surface) => surface.call1((pixel,))?.extract()?,
-                None => None,
-            };
-            let hidden: Option<f64> = match before {
-                Some(before) => before.call_method1("get", (&part.site,))?.extract()?,
-                None => None,
-            };
-            let flat = eye.undistorted(found.pixel);
-            let observation = SiteObservation { pixel: found, flat, expected, hidden: hidden.unwrap_or(0.0), surface };
+            let surface: Option<f64> = surface.map_or(Ok(None), |surface| surface.call1((pixel,))?.extract())?;
+            let hidden = before.map_or(Ok(None), |before| before.call_method1("get", (&part.site,))?.extract())?;
+            let observation = SiteObservation { pixel: found, expected, hidden: hidden.unwrap_or(0.0), surface };
             match part.measurement(&observation, &sensor, gate.as_mut().map(|gate| &mut gate.0)) {
                 SiteMeasurement::Ray(direction, sigma) => rays.push(PySiteRay {
                     site: part.site.clone(),
@@ -115,13 +108,6 @@ impl PyKeypointLayout {
             }
         }
         Ok((rays, points, unseen, dropped))
-    }
-}
-
-impl PyKeypointLayout {
-    /// Predicted positions of the sites in a mapping of names to positions.
-    fn places(&self, places: &Bound<'_, PyAny>) -> PyResult<Vec<Option<Vec3>>> {
-        places_of(places, self.0.iter().map(|part| &*part.site))
     }
 }
 
@@ -143,10 +129,9 @@ pub(crate) fn carried<'py>(
     world_from_sensor: Option<PyReadonlyArray2<'py, f64>>,
 ) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
     let pose = world_from_sensor.as_ref().map(|pose| affine("world_from_sensor", pose)).transpose()?;
-    let array = PointArray::new("points", points)?;
-    let view = array.view(py);
+    let view: PointView = self::points("points", points)?.extract()?;
     let moved = voodoo_sensors::carried::carried(view.points()?, tracker.tracker()?, elapsed, pose.as_ref());
-    let moved = moved.map_err(Raise::raise)?;
+    let moved = moved.map_err(raise)?;
     let array =
         |moved: Vec<Vec3>| PyArray1::from_iter(py, moved.iter().flat_map(Vec3::to_array)).reshape([moved.len(), 3]);
     moved.map(array).transpose()
@@ -163,5 +148,5 @@ pub(crate) fn nearest_surface(
 ) -> PyResult<Option<f64>> {
     let found =
         voodoo_sensors::registration::nearest_surface(rows("pixels", &pixels)?, depths.as_slice()?, pixel, radius);
-    found.map_err(Raise::raise)
+    found.map_err(raise)
 }

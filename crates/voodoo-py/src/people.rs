@@ -4,15 +4,14 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use voodoo_core::PeopleOptions;
 use voodoo_core::math::{Aabb, Vec3};
-use voodoo_core::{BodyTracker, Frame, People};
+use voodoo_core::{BodyTracker, Frame, People, PeopleOptions};
 
 use crate::body::PyBody;
-use crate::borrowed::{Borrowed, Parts, color_image, depth_images};
+use crate::borrowed::{Borrowed, Parts};
 use crate::config::config;
 use crate::detector::{detector, warn_of_detector};
-use crate::errors::{BodyError, Raise};
+use crate::errors::{BodyError, raise};
 use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
 use crate::tracker::{PyTracker, site_positions};
@@ -69,7 +68,7 @@ impl PyPeople {
         let region = region.map(|(low, high)| Aabb::new(Vec3::from_array(low), Vec3::from_array(high)));
         let mut options = PeopleOptions::default();
         (options.limit, options.nearest, options.forget_after, options.region) = (limit, nearest, forget_after, region);
-        let mut people = People::new(body.0.clone(), config(values)?, options).map_err(Raise::raise)?;
+        let mut people = People::new(body.0.clone(), config(values)?, options).map_err(raise)?;
         if let Some(found) = self::detector(detector)? {
             people = people.with_detector(found);
         }
@@ -87,22 +86,18 @@ impl PyPeople {
     ) -> PyResult<Vec<(usize, PyEstimate)>> {
         let body = self.people.prototype();
         let all = Borrowed::new(py, frame, body, 0)?;
-        let (clouds, images) = (all.clouds()?, depth_images(&all.images)?);
-        let views = frame.color_views(py);
-        let numbered = views.iter().zip(0..);
-        let colors = numbered.map(|(view, camera)| color_image(view, camera)).collect::<PyResult<Vec<_>>>()?;
-        let detections = all.detections();
-        let input = all.frame(frame, &clouds, &images, &colors, &detections);
         // A person's own measurements follow the common ones; their sources are numbered consecutively.
         let first = frame.sources.len();
         let owned = own.iter().map(|(_, frame)| Borrowed::new(py, frame, body, first)).collect::<PyResult<Vec<_>>>()?;
-        let parts = owned.iter().map(|own| Parts::new(&input, own)).collect::<PyResult<Vec<_>>>()?;
-        let frames: Vec<(usize, Frame)> =
-            own.iter().zip(&parts).map(|((id, own), parts)| (*id, parts.frame(&input, own.stamp))).collect();
+        let cameras: Vec<u16> = (0..).take(frame.colors.len()).collect();
         let people = &mut self.people;
-        py.detach(|| people.step(&input, &frames)).map_err(Raise::raise)?;
-        self.detector_failures += usize::from(people.detector_error().is_some());
-        warn_of_detector(py, self.people.detector_error())?;
+        all.with_frame(&cameras, |input| {
+            let parts = owned.iter().map(|own| Parts::new(input, own)).collect::<PyResult<Vec<_>>>()?;
+            let frames: Vec<(usize, Frame)> =
+                own.iter().zip(&parts).map(|((id, own), parts)| (*id, parts.frame(input, own.stamp))).collect();
+            py.detach(|| people.step(input, &frames)).map_err(raise)
+        })?;
+        warn_of_detector(py, self.people.detector_error(), &mut self.detector_failures)?;
         let found = self.people.present().map(|(id, tracker)| {
             let (estimate, names) = (tracker.estimate().clone(), self.names.clone());
             let own = own.iter().filter(|(of, _)| *of == id).flat_map(|(_, own)| &own.sources);
@@ -120,7 +115,7 @@ impl PyPeople {
     /// Adds a person at these positions; returns their id.
     fn add(&mut self, joints: &Bound<'_, PyDict>, fit_sizes: bool) -> PyResult<usize> {
         let positions = site_positions(self.people.prototype(), joints)?;
-        self.people.add(&positions, fit_sizes).map_err(Raise::raise)
+        self.people.add(&positions, fit_sizes).map_err(raise)
     }
 
     /// Why a detected person is not tracked.

@@ -6,8 +6,8 @@ use voodoo_core::math::{Points, Pose};
 use voodoo_core::{SurfaceBatch, TaperedEllipticCylinder};
 
 use crate::arguments;
-use crate::arrays::{PointArray, Row, vector};
-use crate::errors::{MeasurementError, Raise, wrong_argument};
+use crate::arrays::{PointView, Row, points, vector};
+use crate::errors::{BodyError, MeasurementError, wrong_argument};
 
 #[doc = stub!("TaperedEllipticCylinder")]
 #[pyclass(name = "TaperedEllipticCylinder", module = "voodoo", frozen, eq, from_py_object)]
@@ -26,7 +26,6 @@ pub(crate) struct PyClosestPoints {
 #[pymethods]
 impl PyShape {
     #[new]
-    #[pyo3(signature = (length, a0, b0, a1, b1))]
     fn new(
         #[pyo3(from_py_with = arguments::length)] length: f64,
         #[pyo3(from_py_with = arguments::a0)] a0: f64,
@@ -34,7 +33,8 @@ impl PyShape {
         #[pyo3(from_py_with = arguments::a1)] a1: f64,
         #[pyo3(from_py_with = arguments::b1)] b1: f64,
     ) -> PyResult<Self> {
-        TaperedEllipticCylinder::new(length, a0, b0, a1, b1).map(Self).map_err(Raise::raise)
+        let shape = TaperedEllipticCylinder::new(length, a0, b0, a1, b1);
+        shape.map(Self).map_err(|error| BodyError::new_err(error.to_string()))
     }
 
     #[doc = stub!("TaperedEllipticCylinder.length")]
@@ -79,8 +79,7 @@ impl PyShape {
 
     #[doc = stub!("TaperedEllipticCylinder.closest_points")]
     fn closest_points(&self, py: Python<'_>, points: &Bound<'_, PyAny>) -> PyResult<PyClosestPoints> {
-        let array = PointArray::new("points", points)?;
-        let view = array.view(py);
+        let view: PointView = self::points("points", points)?.extract()?;
         let slice = view.points()?;
         if let Some(row) = (0..slice.len()).rfind(|row| !slice.get(*row).is_finite()) {
             let found = format!("points: expected finite meters, found {:?} in row {row}", slice.get(row).to_array());

@@ -6,19 +6,19 @@ use voodoo_core::math::Vec3;
 use voodoo_sensors::sites::SiteGate;
 
 use crate::arrays::{Row, vector};
-use crate::errors::{MeasurementError, Raise};
+use crate::errors::{MeasurementError, raise};
 use crate::people::TrackedBody;
 
 /// Predicted positions of some sites, from a mapping of names to positions; `None` for missing ones.
 pub(crate) fn places_of<'a>(
     places: &Bound<'_, PyAny>,
-    sites: impl Iterator<Item = &'a str>,
+    sites: impl IntoIterator<Item = &'a String>,
 ) -> PyResult<Vec<Option<Vec3>>> {
-    let place = |site: &str| {
+    let place = |site: &String| {
         let place = places.call_method1("get", (site,))?;
         if place.is_none() { Ok(None) } else { vector(site, &place).map(Some) }
     };
-    sites.map(place).collect()
+    sites.into_iter().map(place).collect()
 }
 
 #[doc = stub!("expected_sites")]
@@ -29,7 +29,7 @@ pub(crate) fn expected_sites<'py>(
     stamp: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
     let tracker = tracker.tracker()?;
-    let places = tracker.expected_sites(stamp).map_err(Raise::raise)?;
+    let places = tracker.expected_sites(stamp).map_err(raise)?;
     let named = tracker.body().sites().iter().zip(places).map(|(site, place)| (&site.name, Row(place)));
     named.into_py_dict(py)
 }

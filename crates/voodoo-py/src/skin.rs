@@ -7,13 +7,12 @@ use pyo3::prelude::*;
 use voodoo_core::Camera;
 use voodoo_core::math::Vec3;
 use voodoo_sensors::eye::Eye;
-use voodoo_sensors::skin::colors::CHROMA_BINS;
 use voodoo_sensors::skin::cue::{Expected, SkinCue, SkinInput, SkinSettings};
 use voodoo_sensors::skin::depth::DepthBeside;
 
-use crate::arrays::{DepthArray, Row, rows};
+use crate::arrays::{DepthView, Row, contiguous, vectors};
 use crate::camera::{affine, camera_of};
-use crate::errors::{MeasurementError, Raise, wrong_argument};
+use crate::errors::{MeasurementError, raise, wrong_argument};
 use crate::people::TrackedBody;
 use crate::sites::places_of;
 
@@ -30,30 +29,17 @@ fn colors_of<'a>(image: &'a PyReadonlyArray3<'_, u8>) -> PyResult<&'a [[u8; 3]]>
     Ok(image.as_slice()?.as_chunks().0)
 }
 
-fn vectors(name: &str, places: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Vec3>> {
-    Ok(rows(name, places)?.iter().map(|place| Vec3::from_array(*place)).collect())
-}
-
 #[doc = stub!("SkinCue")]
 #[pyclass(name = "SkinCue", module = "voodoo._core")]
 #[derive(Clone)]
-pub struct PySkinCue {
-    cue: SkinCue,
-    /// Height and width of the last image.
-    size: [usize; 2],
-    /// Of each site its name, and that of the elbow of its side.
-    names: Arc<Vec<[String; 2]>>,
-}
+pub struct PySkinCue(SkinCue);
 
 #[pymethods]
 impl PySkinCue {
     #[new]
     #[pyo3(signature = (sites, *, gate, growth, lost_gate, widest_gate))]
     fn new(sites: Vec<String>, gate: f64, growth: f64, lost_gate: f64, widest_gate: f64) -> Self {
-        let elbow = |site: &String| format!("{}_elbow", site.chars().take(1).collect::<String>());
-        let names = Arc::new(sites.iter().map(|site| [site.clone(), elbow(site)]).collect());
-        let settings = SkinSettings { sites, gate, growth, lost_gate, widest_gate };
-        Self { cue: SkinCue::new(settings), size: [0; 2], names }
+        Self(SkinCue::new(SkinSettings { sites, gate, growth, lost_gate, widest_gate }))
     }
 
     fn __copy__(&self) -> Self {
@@ -62,33 +48,28 @@ impl PySkinCue {
 
     #[getter]
     fn learned(&self) -> u32 {
-        self.cue.colors.learned
-    }
-
-    #[getter]
-    fn colors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        PyArray1::from_slice(py, &self.cue.colors.skin).reshape([CHROMA_BINS, CHROMA_BINS])
+        self.0.colors.learned
     }
 
     #[getter]
     fn mask<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
-        let ([rows, columns], skin) = &self.cue.mask;
-        let mut mask = vec![false; self.size[0] * self.size[1]];
+        let SkinCue { size, mask: ([rows, columns], skin), .. } = &self.0;
+        let mut mask = vec![false; size[0] * size[1]];
         for (row, skin) in rows.clone().zip(skin.chunks_exact(columns.len().max(1))) {
-            let line = &mut mask[row * self.size[1]..][columns.clone()];
+            let line = &mut mask[row * size[1]..][columns.clone()];
             line.iter_mut().zip(skin).for_each(|(mask, skin)| *mask = *skin != 0);
         }
-        PyArray1::from_vec(py, mask).reshape(self.size)
+        PyArray1::from_vec(py, mask).reshape(*size)
     }
 
     #[getter]
     fn candidates(&self) -> Vec<(f64, f64)> {
-        self.cue.candidates.iter().map(|item| item.pixel.into()).collect()
+        self.0.candidates.iter().map(|item| item.pixel.into()).collect()
     }
 
     #[getter]
     fn assigned(&self) -> Vec<(usize, usize)> {
-        self.cue.assigned.clone()
+        self.0.assigned.clone()
     }
 
     #[doc = stub!("SkinCue.observe")]
@@ -108,23 +89,25 @@ impl PySkinCue {
     ) -> PyResult<Vec<Ray>> {
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let mut expected = Vec::new();
-        for (site, names) in self.names.iter().enumerate() {
-            let places = places_of(predicted, names.iter().map(String::as_str))?;
+        for (site, name) in self.0.settings.sites.iter().enumerate() {
+            let elbow = format!("{}_elbow", name.chars().take(1).collect::<String>());
+            let places = places_of(predicted, [name, &elbow])?;
             let [place, elbow] = [0, 1].map(|index| places[index].filter(|place| !place.is_nan()));
             expected.extend(place.map(|place| Expected { site, place, elbow }));
         }
         let names: Vec<String> =
             predicted.call_method0("keys")?.try_iter()?.map(|name| name?.extract()).collect::<PyResult<_>>()?;
-        let joints: Vec<Vec3> = places_of(predicted, names.iter().map(String::as_str))?.into_iter().flatten().collect();
+        let joints: Vec<Vec3> = places_of(predicted, &names)?.into_iter().flatten().collect();
         let depth = depth.map(|(image, per_unit, camera, pose)| {
             let expected = "an array of shape (height, width) and dtype uint16 or float32";
-            let array = DepthArray::cast(&image).ok_or_else(|| wrong_argument("depth", expected, &image))?;
-            Ok::<_, PyErr>((array.view(py), per_unit, camera_of(&camera)?, affine("world_from_depth", &pose)?))
+            let view = contiguous(&image).and_then(|array| array.extract::<DepthView>());
+            let view = view.map_err(|_| wrong_argument("depth", expected, &image))?;
+            Ok::<_, PyErr>((view, per_unit, camera_of(&camera)?, affine("world_from_depth", &pose)?))
         });
         let depth = depth.transpose()?;
         let beside = depth.as_ref().map(|(view, per_unit, camera, pose)| {
-            let depth = Eye { world_from_sensor: *pose, camera };
-            DepthBeside::new(view.pixels()?, *per_unit, depth, eye).map_err(Raise::raise)
+            let eye = Eye { world_from_sensor: *pose, camera };
+            Ok::<_, PyErr>(DepthBeside { image: view.pixels()?, meters_per_unit: *per_unit, eye })
         });
         let others = others.iter().map(TrackedBody::tracker).collect::<PyResult<Vec<_>>>()?;
         let input = SkinInput {
@@ -137,9 +120,8 @@ impl PySkinCue {
             tracker: tracker.as_ref().map(TrackedBody::tracker).transpose()?,
             others: &others,
         };
-        self.size = [camera.height(), camera.width()];
-        let cue = &mut self.cue;
-        let found = py.detach(|| cue.observe(&input)).map_err(Raise::raise)?;
+        let cue = &mut self.0;
+        let found = py.detach(|| cue.observe(&input)).map_err(raise)?;
         Ok(found.iter().map(|site| (site.site, Row(site.direction), site.place.map(Row), site.depth)).collect())
     }
 
@@ -155,11 +137,8 @@ impl PySkinCue {
         #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
     ) -> PyResult<()> {
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
-        let (image, joints) = (colors_of(&image)?, vectors("joints", &joints)?);
-        let sites = vectors("sites", &sites)?;
-        let sites: Vec<Option<Vec3>> =
-            sites.into_iter().map(|place| Some(place).filter(|place| !place.is_nan())).collect();
-        let cue = &mut self.cue;
-        py.detach(|| cue.learn(image, &eye, &joints, &sites)).map_err(Raise::raise)
+        let (image, joints, sites) = (colors_of(&image)?, vectors("joints", &joints)?, vectors("sites", &sites)?);
+        let cue = &mut self.0;
+        py.detach(|| cue.learn(image, &eye, &joints, &sites)).map_err(raise)
     }
 }

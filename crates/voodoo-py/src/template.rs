@@ -1,7 +1,5 @@
 //! Messages of live outputs, in which only numbers change.
 
-use std::io::Write;
-
 use numpy::{PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedStr;
@@ -112,18 +110,15 @@ pub(crate) fn with_values(
     if words.len() != expected {
         return Err(MeasurementError::new_err(format!("words: expected {expected}, found {}", words.len())));
     }
-    let (mut written, mut words) = (Vec::with_capacity(2 * text.len()), words.iter());
-    for part in text.as_bytes().split_inclusive(|&byte| byte <= 1) {
-        let (&last, before) = part.split_last().unwrap_or((&b' ', part));
-        written.extend_from_slice(if last <= 1 { before } else { part });
-        match last {
-            0 => {
-                let number = numbers.next().map_or(0.0, |number| number.round_ties_even()) as i64;
-                write!(written, "{number}")?;
-            }
-            1 => written.extend_from_slice(words.next().map_or(b"", |word| word.as_bytes())),
-            _ => {}
+    let (mut written, mut words) = (String::with_capacity(2 * text.len()), words.iter());
+    for part in text.split_inclusive(['\0', '\u{1}']) {
+        written.push_str(part.trim_end_matches(['\0', '\u{1}']));
+        if part.ends_with('\0') {
+            let number = numbers.next().map_or(0.0, |number| number.round_ties_even()) as i64;
+            written.push_str(&number.to_string());
+        } else if part.ends_with('\u{1}') {
+            written.push_str(words.next().map_or("", |word| word));
         }
     }
-    Ok(String::from_utf8(written)?)
+    Ok(written)
 }

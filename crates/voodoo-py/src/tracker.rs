@@ -6,15 +6,14 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use voodoo_core::math::{Pose, Vec3};
-use voodoo_core::{Body, Frame, TrackError, Tracker};
-use voodoo_core::{ColorImage, RegionLine};
+use voodoo_core::{Body, Frame, RegionLine, TrackError, Tracker};
 
-use crate::arrays::{ColorArray, PointArray, limb_poses, rows, vector};
+use crate::arrays::{ColorView, PointView, limb_poses, picture, points, vector, vectors};
 use crate::body::{JointParts, PyBody, joint};
-use crate::borrowed::{Borrowed, ColorData, ColorViews, color_image, depth_images, number};
+use crate::borrowed::{Borrowed, ColorData, color_images, number};
 use crate::config::config;
 use crate::detector::{detector, warn_of_detector};
-use crate::errors::{MeasurementError, Raise, wrong_argument};
+use crate::errors::{MeasurementError, raise, wrong_argument};
 use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
 use crate::people::TrackedBody;
@@ -36,7 +35,7 @@ pub struct PyTracker {
 pub(crate) fn site_positions(body: &Body, joints: &Bound<'_, PyDict>) -> PyResult<Vec<(usize, Vec3)>> {
     let place = |(name, position): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
         let name: String = name.extract()?;
-        let site = body.site_index(&name).map_err(Raise::raise)?;
+        let site = body.site_index(&name).map_err(raise)?;
         Ok((site, vector(&format!("joints[{name}]"), &position)?))
     };
     joints.iter().map(place).collect()
@@ -49,25 +48,22 @@ pub(crate) fn body_before<'py>(
     sites: PyReadonlyArray2<'py, f64>,
     camera: [f64; 3],
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let py = sites.py();
-    let places: Vec<Vec3> = rows("sites", &sites)?.iter().map(|place| Vec3::from_array(*place)).collect();
-    let found = tracker.tracker()?.body_before(&places, Vec3::from_array(camera));
-    Ok(PyArray1::from_vec(py, found.map_err(Raise::raise)?))
+    let found = tracker.tracker()?.body_before(&vectors("sites", &sites)?, Vec3::from_array(camera));
+    Ok(PyArray1::from_vec(sites.py(), found.map_err(raise)?))
 }
 
 impl PyTracker {
-    /// The color images of a frame, whose cameras are identified by name.
-    fn pictures<'a>(&mut self, frame: &PyFrame, views: &'a ColorViews) -> PyResult<Vec<ColorImage<'a>>> {
-        let mut colors = Vec::with_capacity(views.len());
-        for view in views {
-            let name = &frame.sources[usize::from(view.1.source)];
-            if view.1.camera.distorts() {
+    /// Indices of the cameras of a frame's color images; a camera is identified by its name.
+    fn cameras_of(&mut self, frame: &PyFrame) -> PyResult<Vec<u16>> {
+        let camera = |data: &ColorData| {
+            let name = &frame.sources[usize::from(data.source)];
+            if data.camera.distorts() {
                 let text = format!("color[{name}].camera: expected no distortion: undistort the picture, found some");
                 return Err(MeasurementError::new_err(text));
             }
-            colors.push(color_image(view, number(&mut self.cameras, name))?);
-        }
-        Ok(colors)
+            Ok(number(&mut self.cameras, name))
+        };
+        frame.colors.iter().map(camera).collect()
     }
 
     /// What the tracker makes of a frame's color images at given poses; releases the GIL.
@@ -79,11 +75,11 @@ impl PyTracker {
         question: impl FnOnce(&mut Tracker, &Frame, Option<&[Pose]>) -> Result<T, TrackError> + Send,
     ) -> PyResult<T> {
         let poses = poses.map(|poses| limb_poses(self.tracker.body(), &poses)).transpose()?;
-        let views = frame.color_views(py);
-        let colors = self.pictures(frame, &views)?;
+        let (cameras, views) = (self.cameras_of(frame)?, frame.color_views(py)?);
+        let colors = color_images(&views, &cameras)?;
         let input = Frame::empty(frame.stamp).with_colors(&colors);
         let tracker = &mut self.tracker;
-        py.detach(|| question(tracker, &input, poses.as_deref())).map_err(Raise::raise)
+        py.detach(|| question(tracker, &input, poses.as_deref())).map_err(raise)
     }
 
     fn body_changed(&mut self, py: Python<'_>) -> PyResult<()> {
@@ -96,7 +92,7 @@ impl PyTracker {
 impl PyTracker {
     #[new]
     fn new(body: &PyBody, values: &Bound<'_, PyDict>, detector: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let mut tracker = Tracker::new(body.0.clone(), config(values)?).map_err(Raise::raise)?;
+        let mut tracker = Tracker::new(body.0.clone(), config(values)?).map_err(raise)?;
         if let Some(found) = self::detector(detector)? {
             tracker = tracker.with_detector(found);
         }
@@ -120,7 +116,7 @@ impl PyTracker {
     #[pyo3(signature = (joints, *, fit_sizes=true))]
     fn _reset(&mut self, joints: &Bound<'_, PyDict>, fit_sizes: bool) -> PyResult<PyEstimate> {
         let positions = site_positions(self.tracker.body(), joints)?;
-        self.tracker.reset(&positions, fit_sizes).map_err(Raise::raise)?;
+        self.tracker.reset(&positions, fit_sizes).map_err(raise)?;
         self.body_changed(joints.py())?;
         self.sources.clear();
         Ok(self.estimate())
@@ -128,7 +124,7 @@ impl PyTracker {
 
     fn _reset_pose(&mut self, world_from_limb: Vec<Bound<'_, PyAny>>) -> PyResult<PyEstimate> {
         let poses = limb_poses(self.tracker.body(), &world_from_limb)?;
-        self.tracker.reset_pose(&poses).map_err(Raise::raise)?;
+        self.tracker.reset_pose(&poses).map_err(raise)?;
         self.sources.clear();
         Ok(self.estimate())
     }
@@ -153,31 +149,26 @@ impl PyTracker {
     /// Processes one frame; releases the GIL.
     fn step(&mut self, py: Python<'_>, frame: &PyFrame) -> PyResult<PyEstimate> {
         let borrowed = Borrowed::new(py, frame, self.tracker.body(), 0)?;
-        let (clouds, images) = (borrowed.clouds()?, depth_images(&borrowed.images)?);
-        let views = frame.color_views(py);
-        let colors = self.pictures(frame, &views)?;
-        let detections = borrowed.detections();
-        let input = borrowed.frame(frame, &clouds, &images, &colors, &detections);
+        let cameras = self.cameras_of(frame)?;
         let tracker = &mut self.tracker;
-        py.detach(|| tracker.step(&input).map(|_| ())).map_err(Raise::raise)?;
+        borrowed.with_frame(&cameras, |input| py.detach(|| tracker.step(input).map(|_| ())).map_err(raise))?;
         self.sources.clone_from(&frame.sources);
-        self.detector_failures += usize::from(self.tracker.detector_error().is_some());
-        warn_of_detector(py, self.tracker.detector_error())?;
+        warn_of_detector(py, self.tracker.detector_error(), &mut self.detector_failures)?;
         Ok(self.estimate())
     }
 
     /// Sets images of the empty scene of the camera with this name; an empty list discards them.
-    fn _set_background(&mut self, py: Python<'_>, source: &str, images: Vec<Bound<'_, PyAny>>) -> PyResult<()> {
-        let mut pictures = Vec::with_capacity(images.len());
+    fn _set_background(&mut self, source: &str, images: Vec<Bound<'_, PyAny>>) -> PyResult<()> {
+        let mut views = Vec::with_capacity(images.len());
         for (index, image) in images.iter().enumerate() {
             let expected = "an array of shape (height, width, 3) or (height, width) and dtype uint8";
             let wrong = || wrong_argument(&format!("images[{index}]"), expected, image);
-            pictures.push(ColorArray::new(image).ok_or_else(wrong)?);
+            let (pixels, size) = picture(image).ok_or_else(wrong)?;
+            views.push((pixels.extract::<ColorView>()?, size));
         }
-        let views: Vec<_> = pictures.iter().map(|(pixels, size)| (pixels.view(py), *size)).collect();
         let pixels = views.iter().map(|(view, size)| Ok((view.pixels()?, *size))).collect::<PyResult<Vec<_>>>()?;
         let camera = number(&mut self.cameras, source);
-        self.tracker.set_background(camera, &pixels).map_err(Raise::raise)
+        self.tracker.set_background(camera, &pixels).map_err(raise)
     }
 
     /// Probability of each pixel of a frame's images to show the body at given poses: name of the camera -> (height, width).
@@ -222,28 +213,26 @@ impl PyTracker {
 
     /// Signed distance of world points `(N, 3)` to the posed body, meters, negative inside.
     fn distance<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<f32>>> {
-        let array = PointArray::new("points", points)?;
-        let view = array.view(py);
+        let view: PointView = self::points("points", points)?.extract()?;
         let slice = view.points()?;
-        let distances = py.detach(|| self.tracker.distance(slice)).map_err(Raise::raise)?;
+        let distances = py.detach(|| self.tracker.distance(slice)).map_err(raise)?;
         Ok(PyArray1::from_vec(py, distances))
     }
 
     /// Signed distances `(limbs, N)` of world points `(N, 3)` to every limb of the posed body, meters, negative inside.
     fn limb_distances<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let array = PointArray::new("points", points)?;
-        let view = array.view(py);
+        let view: PointView = self::points("points", points)?.extract()?;
         let slice = view.points()?;
-        let distances = py.detach(|| self.tracker.limb_distances(slice)).map_err(Raise::raise)?;
+        let distances = py.detach(|| self.tracker.limb_distances(slice)).map_err(raise)?;
         Ok(PyArray2::from_vec2(py, &distances)?)
     }
 
     fn scale(&mut self, factor: f64) -> PyResult<()> {
-        self.tracker.scale(factor).map_err(Raise::raise)
+        self.tracker.scale(factor).map_err(raise)
     }
 
     fn set_shape(&mut self, limb: &str, shape: &PyShape) -> PyResult<()> {
-        self.tracker.set_shape(limb, shape.0).map_err(Raise::raise)
+        self.tracker.set_shape(limb, shape.0).map_err(raise)
     }
 
     fn _add_limb(
@@ -256,12 +245,12 @@ impl PyTracker {
         sites: Vec<(String, [f64; 3])>,
     ) -> PyResult<()> {
         let sites = sites.into_iter().map(|(name, position)| (name, Vec3::from_array(position))).collect();
-        self.tracker.add_limb(name, parent, shape.0, joint(parts), sites).map_err(Raise::raise)?;
+        self.tracker.add_limb(name, parent, shape.0, joint(parts), sites).map_err(raise)?;
         self.body_changed(py)
     }
 
     fn remove_limb(&mut self, py: Python<'_>, name: &str) -> PyResult<()> {
-        self.tracker.remove_limb(name).map_err(Raise::raise)?;
+        self.tracker.remove_limb(name).map_err(raise)?;
         self.body_changed(py)
     }
 

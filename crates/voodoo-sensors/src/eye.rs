@@ -1,6 +1,6 @@
 //! A color camera and its pose.
 
-use voodoo_core::math::{Affine3, Mat3, Vec3};
+use voodoo_core::math::{Affine3, Vec3};
 use voodoo_core::{Camera, TrackError};
 
 /// A camera and its pose.
@@ -55,14 +55,18 @@ impl Eye<'_> {
 
     /// Position in the world at `(x/z, y/z)` and the depth z, meters.
     pub fn place(&self, [x, y]: [f64; 2], z: f64) -> Vec3 {
-        let Mat3 { x_axis, y_axis, z_axis } = self.world_from_sensor.matrix3;
-        self.origin() + z * (x * x_axis + y * y_axis + z_axis)
+        self.origin() + z * (self.world_from_sensor.matrix3 * Vec3::new(x, y, 1.0))
     }
 
     /// Unit vector in the world through `(x/z, y/z)`.
     pub fn direction(&self, [x, y]: [f64; 2]) -> Vec3 {
-        let Mat3 { x_axis, y_axis, z_axis } = self.world_from_sensor.matrix3;
-        (x * x_axis + y * y_axis + z_axis).normalize()
+        (self.world_from_sensor.matrix3 * Vec3::new(x, y, 1.0)).normalize()
+    }
+
+    /// Distance of a world position from the ray along a unit vector, meters.
+    pub(crate) fn distance_from_ray(&self, place: Vec3, direction: Vec3) -> f64 {
+        let offset = place - self.origin();
+        (offset - offset.dot(direction).max(0.0) * direction).length()
     }
 }
 
@@ -71,6 +75,7 @@ impl Eye<'_> {
 mod tests {
     use super::*;
     use voodoo_core::Lens;
+    use voodoo_core::math::Mat3;
 
     #[test]
     fn the_ray_behind_a_pixel_leads_to_what_is_visible_there() {

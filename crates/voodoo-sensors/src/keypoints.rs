@@ -6,7 +6,6 @@ use voodoo_core::math::Vec3;
 
 /// Standard deviation added for each meter of the person's own body before the site, beyond half a limb: the network guesses such
 /// a site.
-/// site.
 const GUESSED: f64 = 0.4;
 
 /// A site and the keypoints that define it.
@@ -51,8 +50,6 @@ pub struct Sensor<'a> {
 pub struct SiteObservation {
     /// Its pixel and confidence.
     pub pixel: SitePixel,
-    /// The undistorted pixel `(x/z, y/z)`; NaN where it is not known.
-    pub flat: [f64; 2],
     /// Predicted position, world frame, meters.
     pub expected: Vec3,
     /// Length of the person's own body in front of the site, meters.
@@ -96,10 +93,9 @@ impl SiteKeypoints {
         mut gate: Option<&mut SiteGate>,
     ) -> SiteMeasurement {
         let (eye, expected) = (&sensor.eye, observation.expected);
-        let direction = eye.direction(observation.flat);
+        let direction = eye.direction(eye.undistorted(observation.pixel.pixel));
         let depth = eye.in_sensor(expected).z;
-        let offset = expected - eye.origin();
-        let away = (offset - offset.dot(direction).max(0.0) * direction).length();
+        let away = eye.distance_from_ray(expected, direction);
         if !(depth > 0.0 && away >= 0.0) {
             return SiteMeasurement::Dropped;
         }
@@ -131,22 +127,19 @@ pub fn nearest_person<'a>(
     expected: &[[f64; 2]],
     least: f64,
 ) -> Option<usize> {
-    let mut best: Option<(usize, f64)> = None;
-    for (number, keypoints) in people.enumerate() {
+    let middle = |(number, keypoints): (usize, &[[f64; 3]])| {
         let apart = |(part, place): (&SiteKeypoints, &[f64; 2])| {
             let [u, v] = part.pixel(keypoints, least)?.pixel;
             Some((u - place[0]).hypot(v - place[1])).filter(|distance| distance.is_finite())
         };
         let mut distances: Vec<f64> = layout.iter().zip(expected).filter_map(apart).collect();
         distances.sort_unstable_by(f64::total_cmp);
-        let Some(upper) = distances.get(distances.len() / 2) else { continue };
-        let lower = distances.get((distances.len() - 1) / 2).unwrap_or(upper);
-        let middle = 0.5 * (lower + upper);
-        if best.is_none_or(|(_, least)| middle < least) {
-            best = Some((number, middle));
-        }
-    }
-    best.map(|(number, _)| number)
+        let upper = distances.get(distances.len() / 2)?;
+        let lower = distances.get((distances.len() - 1) / 2)?;
+        Some((number, 0.5 * (lower + upper)))
+    };
+    let nearest = people.enumerate().filter_map(middle).min_by(|a, b| a.1.total_cmp(&b.1));
+    nearest.map(|(number, _)| number)
 }
 
 #[cfg(test)]
@@ -187,8 +180,7 @@ mod tests {
         let eye = Eye { world_from_sensor: voodoo_core::math::Affine3::IDENTITY, camera: &camera };
         let sensor = Sensor { eye, source: "camera", noise: 3.0, place_sigma: 0.03, stamp: 0.0 };
         let pixel = SitePixel { pixel: [160.0, 120.0], confidence: 1.0 };
-        let observation =
-            SiteObservation { pixel, flat: [0.0; 2], expected: Vec3::new(0.05, 0.0, 2.0), hidden: 0.0, surface: None };
+        let observation = SiteObservation { pixel, expected: Vec3::new(0.05, 0.0, 2.0), hidden: 0.0, surface: None };
         let wrist = part(&[(0, 1.0)]);
         let mut gate = SiteGate::new(0.1, 0.0, 0.1);
         let sigma = |measured: SiteMeasurement| match measured {
@@ -212,7 +204,7 @@ mod tests {
         let far = SiteObservation { expected: Vec3::new(0.2, 0.0, 2.0), ..observation };
         assert_eq!(wrist.measurement(&far, &sensor, Some(&mut gate)), SiteMeasurement::Dropped);
         for wrong in [
-            SiteObservation { flat: [f64::NAN; 2], ..observation },
+            SiteObservation { pixel: SitePixel { pixel: [f64::NAN; 2], ..pixel }, ..observation },
             SiteObservation { expected: -Vec3::Z, ..observation },
         ] {
             assert_eq!(wrist.measurement(&wrong, &sensor, None), SiteMeasurement::Dropped);

@@ -23,14 +23,7 @@ impl SiteGate {
 
     /// Radius of a site's gate at a given time, meters.
     pub fn limit(&mut self, site: &str, source: &str, stamp: f64) -> f64 {
-        let known = self.last.get(source).and_then(|sites| sites.get(site)).copied();
-        let waited = match known {
-            Some(last) => (stamp - last).max(0.0),
-            None => {
-                self.remember(site, source, stamp);
-                0.0
-            }
-        };
+        let waited = (stamp - *self.last(site, source, stamp)).max(0.0);
         (self.radius + self.growth * waited).min(self.widest)
     }
 
@@ -38,13 +31,14 @@ impl SiteGate {
     pub fn accepts(&mut self, site: &str, distance: f64, stamp: f64, source: &str) -> bool {
         let near = distance <= self.limit(site, source, stamp);
         if near {
-            self.remember(site, source, stamp);
+            *self.last(site, source, stamp) = stamp;
         }
         near
     }
 
-    fn remember(&mut self, site: &str, source: &str, stamp: f64) {
-        self.last.entry(source.to_owned()).or_default().insert(site.to_owned(), stamp);
+    /// The time from which the gate of a site widens; `stamp` if the site was not expected before.
+    fn last(&mut self, site: &str, source: &str, stamp: f64) -> &mut f64 {
+        self.last.entry(source.to_owned()).or_default().entry(site.to_owned()).or_insert(stamp)
     }
 }
 

@@ -26,14 +26,14 @@ impl IkSolver {
             self.gain *= 0.5;
         }
         // First without the lower levels; then with a quarter of the failed level's own part; then with the levels above only.
-        for (stage, fraction) in [(failed, 1.0), (failed, 0.25), (failed, 0.0)] {
-            if (stage == last && fraction == 1.0) || (stage == 0 && fraction == 0.0) {
+        for fraction in [1.0, 0.25, 0.0] {
+            if (failed == last && fraction == 1.0) || (failed == 0 && fraction == 0.0) {
                 continue;
             }
-            self.propose(problem, angles, stage, fraction);
+            self.propose(problem, angles, failed, fraction);
             self.evaluate(problem);
             let above = Active { levels: count.min(failed + 1), image: image && failed == count, slack };
-            if (fraction == 0.0 && slack) || self.first_failure(n, above, stage).is_none() {
+            if (fraction == 0.0 && slack) || self.first_failure(n, above, failed).is_none() {
                 return self.take_trial(angles);
             }
         }
@@ -60,11 +60,7 @@ impl IkSolver {
             (0..n).map(|i| step[i] - from.map_or(0.0, |from| self.stages[from * n + i])).map(|d| d * d).sum()
         };
         for level in 0..active.levels.min(stage + 1) {
-            let rise = match level {
-                0 if stage == 0 => 0.0,
-                0 => length(Some(0)),
-                _ => length(None),
-            };
+            let rise = length((level == 0).then_some(0));
             let limit = match self.levels.best.get(level) {
                 Some(best) if !active.slack => (best + 0.1 * SETTLED).max(self.levels.before[level]),
                 _ => self.levels.before[level] + rise + 1e-13,
@@ -87,7 +83,7 @@ impl IkSolver {
     fn take_trial(&mut self, angles: &mut [f64]) -> f64 {
         let moved = angles.iter().zip(&self.trial_angles).fold(0.0_f64, |most, (old, new)| most.max((old - new).abs()));
         angles.copy_from_slice(&self.trial_angles);
-        self.accept();
+        std::mem::swap(&mut self.here, &mut self.trial);
         moved
     }
 }

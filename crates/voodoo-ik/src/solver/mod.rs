@@ -11,7 +11,7 @@ use super::goal::{Goal, level_cost, level_ranges};
 use super::image::Criterion;
 use super::linear::{Damped, Taken};
 use super::model::{ChainModel, Kinematics};
-use voodoo_core::math::{Pose, reset};
+use voodoo_core::math::{Pose, refill, reset};
 
 pub use rest::Rest;
 
@@ -282,16 +282,15 @@ impl IkSolver {
     fn evaluate_here(&mut self, problem: &IkProblem, angles: &[f64]) {
         self.trial_angles.copy_from_slice(angles);
         self.evaluate(problem);
-        self.accept();
+        std::mem::swap(&mut self.here, &mut self.trial);
     }
 
     /// Computes costs and kinematics at the trial angles, and the criterion in the image phase.
     fn evaluate(&mut self, problem: &IkProblem) {
         self.report.tried += 1;
         problem.model.place(problem.base, &self.trial_angles, &mut self.trial.at);
-        self.trial.cost.clear();
         let costs = self.levels.ranges.iter().map(|level| level_cost(&problem.goals[level.clone()], &self.trial.at));
-        self.trial.cost.extend(costs);
+        refill(&mut self.trial.cost, costs);
         self.trial.h = match problem.criterion {
             Some(criterion) if self.comparing => {
                 self.report.compared += 1;
@@ -299,10 +298,6 @@ impl IkSolver {
             }
             _ => 0.0,
         };
-    }
-
-    fn accept(&mut self) {
-        std::mem::swap(&mut self.here, &mut self.trial);
     }
 
     fn nudge(&mut self, problem: &IkProblem, angles: &mut [f64]) {

@@ -33,15 +33,11 @@ impl IkSolver {
         // Improvements that lower levels made in higher ones also count.
         refill(&mut self.levels.best, self.here.cost.iter().map(|cost| cost.sqrt()));
         let most = self.here.h + LEVEL;
-        let mut rest = false;
-        for _ in 0..problem.options.steps {
+        let rests = (0..problem.options.steps).any(|_| {
             self.report.steps += 1;
-            if self.pull_once(problem, most, angles) < problem.options.still {
-                rest = true;
-                break;
-            }
-        }
-        self.report.converged &= rest;
+            self.pull_once(problem, most, angles) < problem.options.still
+        });
+        self.report.converged &= rests;
     }
 
     /// Takes one step with `h` at most `most`. Returns the largest change of an unknown; zero if no step is accepted.

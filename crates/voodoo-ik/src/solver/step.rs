@@ -3,7 +3,7 @@
 use super::super::goal::level_rows;
 use super::super::linear::largest;
 use super::{Active, IkProblem, IkSolver};
-use voodoo_core::math::dot;
+use voodoo_core::math::{dot, refill};
 
 /// Minimum damping, m^2: small relative to `J J^T` of any visible motion, so that the last steps are Newton steps.
 const LEAST_DAMPING: f64 = 1e-10;
@@ -38,19 +38,14 @@ impl IkSolver {
         let damping = self.levels.trust[level] * self.here.cost[level] + LEAST_DAMPING;
         for attempt in 0..=n {
             let stage = &self.stages[level * n..(level + 1) * n];
-            self.linear.target.clear();
             let rows = self.linear.jacobian.chunks_exact(n).zip(&self.linear.residual);
-            self.linear.target.extend(rows.map(|(row, e)| -e - dot(row, stage)));
+            refill(&mut self.linear.target, rows.map(|(row, e)| -e - dot(row, stage)));
             if attempt == 0 {
                 self.levels.before[level] = dot(&self.linear.target, &self.linear.target).sqrt();
             }
-            if self.linear.taken.is_empty() {
-                self.linear.damped.solve(&self.linear.jacobian, &self.linear.target, damping, &mut self.linear.part);
-            } else {
-                self.linear.projected.clone_from(&self.linear.jacobian);
-                self.linear.projected.chunks_exact_mut(n).for_each(|row| self.linear.taken.project(row));
-                self.linear.damped.solve(&self.linear.projected, &self.linear.target, damping, &mut self.linear.part);
-            }
+            self.linear.projected.clone_from(&self.linear.jacobian);
+            self.linear.projected.chunks_exact_mut(n).for_each(|row| self.linear.taken.project(row));
+            self.linear.damped.solve(&self.linear.projected, &self.linear.target, damping, &mut self.linear.part);
             if !self.add_part(problem, level, angles) {
                 break;
             }

@@ -1,7 +1,7 @@
 //! The color model of skin: two histograms of chroma, of skin and of what is around it, learned with a forgetting factor.
 
 /// Bins of either axis of chroma, Cr and Cb.
-pub const CHROMA_BINS: usize = 64;
+const CHROMA_BINS: usize = 64;
 const BINS: usize = CHROMA_BINS * CHROMA_BINS;
 /// Pixels with less luma have no reliable chroma.
 const DARKEST: i32 = 30;
@@ -31,8 +31,6 @@ pub struct SkinColors {
     /// Number of images that were learned from.
     pub learned: u32,
     rest: Vec<f32>,
-    is_skin: Vec<bool>,
-    is_near: Vec<bool>,
 }
 
 /// Bin of a color (blue, green, red) by chroma as in ITU-R BT.601; `None` if it is dark.
@@ -55,27 +53,24 @@ impl Default for SkinColors {
         };
         let mut skin: Vec<f32> = (0..BINS).map(bell).collect();
         normalize(&mut skin);
-        let (rest, learned) = (vec![1.0 / BINS as f32; BINS], 0);
-        let mut colors = Self { skin, learned, rest, is_skin: Vec::new(), is_near: Vec::new() };
-        colors.judge();
-        colors
+        Self { skin, learned: 0, rest: vec![1.0 / BINS as f32; BINS] }
     }
 }
 
 impl SkinColors {
-    fn judge(&mut self) {
-        let above = |ratio: f32| self.skin.iter().zip(&self.rest).map(|(skin, rest)| *skin > ratio * rest).collect();
-        (self.is_skin, self.is_near) = (above(RATIO), above(NEAR_RATIO));
+    /// Whether skin is so many times as likely as its surroundings to have the colors of a bin.
+    fn is_above(&self, bin: usize, ratio: f32) -> bool {
+        self.skin[bin] > ratio * self.rest[bin]
     }
 
     /// Whether a color (blue, green, red) is that of skin.
     pub(super) fn contains(&self, color: [u8; 3]) -> bool {
-        bin(color).is_some_and(|bin| self.is_skin[bin])
+        bin(color).is_some_and(|bin| self.is_above(bin, RATIO))
     }
 
     /// Learns from the pixels of a face, of which those near the colors of skin count, and from those that show no skin.
     pub(super) fn learn(&mut self, face: impl Iterator<Item = [u8; 3]>, rest: impl Iterator<Item = [u8; 3]>) {
-        let near = |index: &usize| self.is_near[*index];
+        let near = |bin: &usize| self.is_above(*bin, NEAR_RATIO);
         let Some(skin) = histogram(face.filter_map(bin).filter(near)) else { return };
         let Some(rest) = histogram(rest.filter_map(bin)) else { return };
         let keep = if self.learned < FIRST_IMAGES { FORGETTING_AT_FIRST } else { FORGETTING };
@@ -84,17 +79,16 @@ impl SkinColors {
         let unseen = UNSEEN / BINS as f32;
         self.rest.iter_mut().zip(rest).for_each(|(old, new)| mixed(old, (1.0 - UNSEEN) * new + unseen));
         self.learned += 1;
-        self.judge();
     }
 }
 
 /// Smoothed and normalized histogram of colors; `None` for fewer than [`FEWEST`].
 fn histogram(bins: impl Iterator<Item = usize>) -> Option<Vec<f32>> {
-    let (mut values, mut count) = (vec![0.0_f32; BINS], 0.0_f32);
-    bins.for_each(|bin| {
-        values[bin] += 1.0;
-        count += 1.0;
-    });
+    let mut values = vec![0.0_f32; BINS];
+    bins.for_each(|bin| values[bin] += 1.0);
+    if values.iter().sum::<f32>() < FEWEST {
+        return None;
+    }
     for step in [1, 1, CHROMA_BINS, CHROMA_BINS] {
         // A binomial kernel along one axis; its ends are repeated.
         let place = |index: usize| index / step % CHROMA_BINS;
@@ -106,7 +100,7 @@ fn histogram(bins: impl Iterator<Item = usize>) -> Option<Vec<f32>> {
         values = (0..BINS).map(smoothed).collect();
     }
     normalize(&mut values);
-    (count >= FEWEST).then_some(values)
+    Some(values)
 }
 
 fn normalize(values: &mut [f32]) {

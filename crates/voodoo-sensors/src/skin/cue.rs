@@ -48,7 +48,7 @@ const KEPT: (f64, f64) = (0.25, 0.35);
 const NEAREST: f64 = 0.1;
 
 /// Parameters that turn skin regions into rays.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct SkinSettings {
     /// Names of the sites; those of hands start with `l_` or `r_`.
     pub sites: Vec<String>,
@@ -136,12 +136,14 @@ struct Trace {
 type Window = [Range<usize>; 2];
 
 /// The state of the skin cue of one camera.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct SkinCue {
     /// Parameters.
     pub settings: SkinSettings,
     /// The learned colors.
     pub colors: SkinColors,
+    /// Height and width of the last image.
+    pub size: [usize; 2],
     /// The part of the last image that was searched, and its pixels of skin.
     pub mask: (Window, Vec<u8>),
     /// The candidates in the last image.
@@ -157,15 +159,7 @@ impl SkinCue {
     /// Returns a cue without any image.
     pub fn new(settings: SkinSettings) -> Self {
         let count = settings.sites.len();
-        Self {
-            settings,
-            colors: SkinColors::default(),
-            mask: ([0..0, 0..0], Vec::new()),
-            candidates: Vec::new(),
-            assigned: Vec::new(),
-            traces: vec![None; count],
-            missed: vec![None; count],
-        }
+        Self { settings, traces: vec![None; count], missed: vec![None; count], ..Self::default() }
     }
 
     fn side(&self, site: usize) -> Option<Side> {
@@ -175,11 +169,15 @@ impl SkinCue {
     /// Finds the skin regions of an image; returns a ray for each detected site.
     ///
     /// # Errors
-    /// [`TrackError`] when the image is not of the camera's size, or a tracker has no pose.
+    /// [`TrackError`] when an image is not of its camera's size, or a tracker has no pose.
     pub fn observe(&mut self, input: &SkinInput) -> Result<Vec<FoundSite>, TrackError> {
         input.eye.check("image", "a color for every pixel of the camera", input.image.len())?;
+        if let Some(depth) = &input.depth {
+            depth.eye.check("depth", "a depth for every pixel of the camera", depth.image.len())?;
+        }
         let depth = |site: &Expected| input.eye.in_sensor(site.place).z;
         let sites: Vec<Expected> = input.expected.iter().filter(|site| depth(site) > NEAREST).copied().collect();
+        self.size = [input.eye.camera.height(), input.eye.camera.width()];
         self.candidates.clear();
         self.assigned.clear();
         self.mask.1.clear();
@@ -218,7 +216,7 @@ impl SkinCue {
             let rays = input.eye.camera.rays();
             let marked = pixels(&window).zip(mask.iter_mut().zip(&mut ranges)).filter(|(_, (mask, _))| **mask != 0);
             for (pixel, (mask, range)) in marked {
-                if let Some(z) = depth.at(rays[index(pixel)].map(f64::from), 0.5 * (near + far)) {
+                if let Some(z) = depth.at(&input.eye, rays[index(pixel)].map(f64::from), 0.5 * (near + far)) {
                     (*mask, *range) = (u8::from(near < z && z < far), z);
                 }
             }
@@ -261,12 +259,11 @@ impl SkinCue {
                 continue;
             }
             for site in sites {
-                let Some(elbow) = site.elbow.filter(|_| self.side(site.site).is_some()) else {
-                    if self.side(site.site).is_none() {
-                        add(Some(site.site), middle);
-                    }
+                if self.side(site.site).is_none() {
+                    add(Some(site.site), middle);
                     continue;
-                };
+                }
+                let Some(elbow) = site.elbow else { continue };
                 let elbow = input.eye.pixel(input.eye.in_sensor(elbow));
                 let farther = |a: &&usize, b: &&usize| apart(at(**a), elbow).total_cmp(&apart(at(**b), elbow));
                 if let Some(end) = members.iter().max_by(farther).filter(|_| elbow[0].is_finite()) {
@@ -329,10 +326,7 @@ impl SkinCue {
     fn distance(&self, site: &Expected, candidate: &SkinCandidate, input: &SkinInput, gate: f64) -> Option<f64> {
         let from = |target: Vec3| match self.inside(site.site, candidate) {
             Some(place) => place.distance(target),
-            None => {
-                let offset = target - input.eye.origin();
-                (offset - offset.dot(candidate.direction).max(0.0) * candidate.direction).length()
-            }
+            None => input.eye.distance_from_ray(target, candidate.direction),
         };
         let distance = from(site.place);
         let kept = self.traces[site.site].filter(|_| input.depth.is_some()).and_then(|trace| {
@@ -367,23 +361,15 @@ impl SkinCue {
     }
 
     /// Learns the colors of the face and of what is around the body. `joints` are the positions of the body, and `sites` those of
-    /// head and hands, meters. The head must have been found, unless nothing was learned yet.
+    /// head and hands, meters, NaN where they are not known. The head must have been found, unless nothing was learned yet.
     ///
     /// # Errors
     /// [`TrackError::Measurement`] when the image is not of the camera's size.
-    pub fn learn(
-        &mut self,
-        image: &[[u8; 3]],
-        eye: &Eye,
-        joints: &[Vec3],
-        sites: &[Option<Vec3>],
-    ) -> Result<(), TrackError> {
+    pub fn learn(&mut self, image: &[[u8; 3]], eye: &Eye, joints: &[Vec3], sites: &[Vec3]) -> Result<(), TrackError> {
         eye.check("image", "a color for every pixel of the camera", image.len())?;
         let (mut faces, mut shown) = (Vec::new(), Vec::new());
-        for (site, place) in sites.iter().enumerate() {
-            let Some(inside) = place.map(|place| eye.in_sensor(place)).filter(|inside| inside.z > NEAREST) else {
-                continue;
-            };
+        let inside = sites.iter().map(|place| eye.in_sensor(*place)).enumerate();
+        for (site, inside) in inside.filter(|(_, inside)| inside.z > NEAREST) {
             let head = self.side(site).is_none();
             let (pixel, radius) = (eye.pixel(inside), if head { FACE } else { PALM } * eye.focal() / inside.z);
             shown.push((pixel, TAUGHT.1 * radius));

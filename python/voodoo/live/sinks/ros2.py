@@ -137,7 +137,7 @@ class Ros2Sink(Output):
 
     def _describe(self, observed: Mapping[int, Body]) -> None:
         for number, body in observed.items():
-            size = float(body.core.sizes()[:, 0].sum())
+            size = float(np.sum([limb.shape.length for limb in body.limbs]))
             if abs(self._described.get(number, 0.0) - size) > _OTHER_SIZE * size:
                 self._write(ros2.description(body, ros2.person_id(number)))
                 self._described[number] = size
