@@ -21,8 +21,8 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// The row of a person whose pose is turned.
-    fn row(&self, estimate: &Estimate, body: &Body, (turn, shift): &(Mat3, Vec3)) -> Option<Vec<f64>> {
+    /// Appends the row of a person whose pose is turned.
+    fn append(&self, row: &mut Vec<f64>, estimate: &Estimate, body: &Body, (turn, shift): &(Mat3, Vec3)) -> Option<()> {
         let poses = estimate.world_from_limb.iter();
         let poses = poses.map(|pose| (*turn * Mat3::from_quat(pose.rotation), *turn * pose.translation + *shift));
         let poses: Vec<_> = poses.collect();
@@ -34,17 +34,17 @@ impl Layout {
         let unknown = [[f64::NAN; 6]; 6];
         let root = estimate.covariances.limbs.first().unwrap_or(&unknown);
         let root = moved_covariance(root, turn, *places.first()? - poses.first()?.1);
-        let mut row: Vec<f64> = frames.into_iter().flatten().collect();
-        row.extend(body.limbs().iter().zip(&poses).flat_map(|(limb, pose)| cylinder(limb, pose)));
-        row.extend(joints.iter().flat_map(Vec3::to_array));
+        row.extend_from_slice(frames.as_flattened());
+        body.limbs().iter().zip(&poses).for_each(|(limb, pose)| row.extend(cylinder(limb, pose)));
+        joints.iter().for_each(|place| row.extend(place.to_array()));
         for (turn, head) in turns.iter().zip(&heads) {
             row.extend(head.to_array());
             row.extend(math::quaternion(turn));
         }
         row.extend(angles(&turns, &self.angles)?);
-        row.extend(root.into_iter().flatten());
-        row.extend(limbs.into_iter().flat_map(|[x, y, z, i, j, k, w]| [-y, z, x, j, -k, -i, w]));
-        Some(row)
+        row.extend_from_slice(root.as_flattened());
+        limbs.iter().for_each(|[x, y, z, i, j, k, w]| row.extend([-y, *z, *x, *j, -k, -i, *w]));
+        Some(())
     }
 }
 
@@ -70,7 +70,7 @@ impl Layout {
         let turn = turn.map_or((Mat3::IDENTITY, Vec3::ZERO), parts);
         let mut rows = Vec::new();
         for (one, body) in estimates.iter().zip(&bodies) {
-            rows.extend(self.row(&one.estimate, &body.0, &turn).ok_or_else(unplanned)?);
+            self.append(&mut rows, &one.estimate, &body.0, &turn).ok_or_else(unplanned)?;
         }
         let sure = |one: &PyRef<'_, PyEstimate>| {
             one.estimate.covariances.limbs.first().is_some_and(|root| root[0][0].is_finite())
