@@ -147,10 +147,11 @@ def cost(recording: MadeUpRecording, rounds: int) -> None:
     for turn in range(2 * rounds):
         on = turn % 4 in (1, 2)
         made = session(recording, [Watched(one.name, one.publish, waits=one.waits) for one in sinks if on], [])
+        dropped = made.report()["dropped"]
+        if dropped or len(made.persons()) < 4:  # a frame that is not tracked would be the least
+            print(f"{len(made.persons())} people; {dropped} frames dropped: left out")
+            continue
         used[on].append(1e3 * np.diff(recording.used)[len(recording.used) // 3 :])  # everybody is found
-        report = made.report()
-        if report["dropped"] or len(made.persons()) < 4:
-            print(f"{len(made.persons())} people; {report['dropped']} frames dropped")
     without, with_all = (np.min(used[on], axis=0) for on in (False, True))
     more = with_all - without
     print(

@@ -16,6 +16,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import voodoo
+import voodoo._core as _core
 from browser import needs_chromium, told_by
 from commands import run
 from live_rig import ByHand
@@ -28,6 +29,7 @@ from voodoo.live.assembly import LiveFrame
 from voodoo.live.follow import Step
 from voodoo.live.session import Output, Session
 from voodoo.live.sinks import register, sink_of
+from voodoo.pipeline.front_end import nobody
 from voodoo.recordings import sample_path
 
 PAGE = Path(__file__).parents[1] / "docs" / "how-to" / "stream.md"
@@ -38,20 +40,16 @@ websockets = pytest.importorskip("websockets.sync.client", reason="pip install w
 def step_of(track, body, index=0, *, number=1, status="tracking", stamp=None):
     """A step whose only person has the pose of a frame of a track."""
     stamp = float(track.stamps[index]) if stamp is None else stamp
-    estimate = SimpleNamespace(
-        stamp=stamp,
-        status=status,
-        residual=float("nan") if status == "lost" else 0.01,
-        joint_names=track.joint_names,
-        joint_positions=track.joints[index],
-        joints=dict(zip(track.joint_names, track.joints[index], strict=True)),
-        limb_names=track.limb_names,
-        limb_poses=track.world_from_limb[index],
-        world_from_limb=dict(zip(track.limb_names, track.world_from_limb[index], strict=True)),
-        limb_status=dict.fromkeys(track.limb_names, "measured"),
-        joint_covariances=(),
-        root_covariance=np.full((6, 6), np.nan),
-    )
+    poses = [(pose[:3, 3].tolist(), Rotation.from_matrix(pose[:3, :3])) for pose in track.world_from_limb[index]]
+    known = {
+        "status": status.title(),
+        "mean_squared_distance": float("nan") if status == "lost" else 1e-4,
+        "sites": track.joints[index].tolist(),
+        "world_from_limb": [{"translation": place, "rotation": turn.as_quat().tolist()} for place, turn in poses],
+        "limb_status": ["Measured"] * len(poses),
+    }
+    plain, *_ = nobody(stamp).__reduce__()[1]
+    estimate = _core._estimate(plain | known, track.limb_names, track.joint_names, body.limb_joints, [])
     return Step(LiveFrame(stamp, (), 0, 0.0, 0.0, False), {number: estimate}, {number: body}, 0.0)
 
 

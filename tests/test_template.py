@@ -28,19 +28,24 @@ def test_numbers_and_stamps_are_replaced_wherever_they_are():
     assert made.filled([table], b"") == made.filled([np.arange(3.0)], b"")
     with pytest.raises(MeasurementError, match="expected 3, found 2"):
         made.filled([np.zeros(2)], b"")
-    with pytest.raises(MeasurementError, match="expected those in the messages"):
+    with pytest.raises(MeasurementError, match="numbers: expected some in the messages"):
         template(lambda numbers: [b"nothing"], 1)
     short = template(lambda numbers: [struct.pack(">ff", *numbers)], 2, single=True)
     assert short.filled([np.array([0.25, 3.0])], b"") == [struct.pack(">ff", 0.25, 3.0)]
 
 
+def test_numbers_may_be_in_messages_twice_or_not_at_all():
+    made = template(lambda numbers: [struct.pack("<dd", numbers[2], numbers[2])], 3)
+    assert made.filled([np.array([1.0, 2.0, -3.5])], b"") == [struct.pack("<dd", -3.5, -3.5)]
+
+
 def test_a_text_gets_whole_numbers_and_words():
-    numbers = [np.array([1.4, -2.6]), np.array([[3.0]])]
-    assert _core.with_values("a \0, \1\0e-5 \0 \1!", numbers, ["b ", ""]) == "a 1, b -3e-5 3 !"
-    with pytest.raises(MeasurementError, match="numbers: expected 1, found 0"):
-        _core.with_values("\0", [], [])
-    with pytest.raises(MeasurementError, match="words: expected 1, found 2"):
-        _core.with_values("\1", [], ["a", "b"])
+    numbers = [np.array([1.4e-5, -2.6e-5]), np.array([[3e-6], [0.0], [1.234567]])]
+    assert _core.people_text(b"a \0, \1\0e-5 \2 \2!\2", numbers, 2.5, []) == b"a 1, 2.5-3e-5 3 0!1234567"
+    assert _core.people_text(b"\1 \1 \1", [], 1.0, [_core._nobody(0.0)]) == b"1.0 searching null"
+    for text, given in ((b"\0", []), (b"\1\1", []), (b"\1", numbers), (b"", [])):
+        with pytest.raises(MeasurementError, match="places for all numbers and words"):
+            _core.people_text(text, given, 1.0, [])
 
 
 def test_plans_and_arrays_that_do_not_fit_are_refused():

@@ -17,6 +17,7 @@ __all__ = [
     "Estimate",
     "Frame",
     "KeypointLayout",
+    "Layout",
     "People",
     "PersonCandidate",
     "SiteGate",
@@ -39,12 +40,12 @@ __all__ = [
     "linear_sum_assignment",
     "moved_covariances",
     "nearest_surface",
+    "people_text",
     "person_candidates",
     "placed",
     "quaternions",
     "render_depth",
     "skeleton",
-    "with_values",
 ]
 
 __version__: str
@@ -278,19 +279,49 @@ class SiteRay:
 
 @final
 class Template:
-    """Messages with places for numbers, each of which is in them once.
+    """Messages with places for `count` whole numbers from `first` on: wherever they are found, and not all need to be.
 
     Numbers are stored in double precision with the least significant byte first, or in single precision with the most.
     """
 
-    def __new__(
-        cls, messages: Sequence[bytes], numbers: npt.NDArray[np.float64], single: bool, stamp: bytes
-    ) -> Template: ...
+    def __new__(cls, messages: Sequence[bytes], first: float, count: int, single: bool, stamp: bytes) -> Template: ...
     def filled(self, numbers: Sequence[npt.NDArray[np.float64]], stamp: bytes) -> list[bytes]:
         """The messages with other numbers, in arrays one after the other, and another stamp that takes as many bytes."""
 
-def with_values(text: str, numbers: Sequence[npt.NDArray[np.float64]], words: Sequence[str]) -> str:
-    """A text whose characters 0 are replaced by the rounded numbers of arrays, and its characters 1 by words, in their order."""
+@final
+class Layout:
+    """Finds everything that live outputs tell of a person, as one row of numbers.
+
+    Of L limbs, J joints, N frames and A angles: N times place and rotation x, y, z, w as of `placed`; L times 12 numbers as of
+    `cylinders`; J joints; L times head and rotation of a bone; A angles; the covariance (6, 6) of the first frame; and L times
+    place and rotation of a limb on its parent, with the axes of Unity (left-handed: left is -X, up Y, ahead Z).
+
+    Args:
+        own: as of `skeleton`.
+        frames: plan as of `placed`, of heads and joints.
+        angles: plan as of `joint_angles`.
+        arms: turns (1, L, 3, 3) from limbs at rest to those of Unity.
+        limbs: plan as of `placed`, of heads.
+    """
+
+    def __new__(
+        cls,
+        own: npt.NDArray[np.int64],
+        frames: npt.NDArray[np.int64],
+        angles: npt.NDArray[np.int64],
+        arms: npt.NDArray[np.float64],
+        limbs: npt.NDArray[np.int64],
+    ) -> Layout: ...
+    def rows(
+        self, estimates: Sequence[Estimate], bodies: Sequence[Body], turn: npt.NDArray[np.float64] | None
+    ) -> tuple[npt.NDArray[np.float64], list[bool]]:
+        """The rows (P, ...) of persons who have a pose, turned by a rigid (4, 4); and whether their covariance is known."""
+
+def people_text(
+    text: bytes, numbers: Sequence[npt.NDArray[np.float64]], stamp: float, estimates: Sequence[Estimate]
+) -> bytes:
+    """A text whose characters 0 are replaced by numbers of arrays in units of 1e-5, its characters 2 in units of 1e-6, and its
+    characters 1 by the stamp and of each person status, residual, and status of the limbs, in their order."""
 
 def quaternions(rotations: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], bool]:
     """Unit quaternions x, y, z, w (..., 4) of rotation matrices (..., 3, 3), whose largest entry is positive; and whether one of

@@ -22,6 +22,7 @@ mod frame;
 mod ik;
 mod ik_view;
 mod keypoints;
+mod layout;
 mod people;
 mod shape;
 mod sites;
@@ -45,12 +46,13 @@ mod _core {
         ik::PyChain,
         ik_view::PyView,
         keypoints::{PyKeypointLayout, carried, linear_sum_assignment, nearest_surface},
+        layout::Layout,
         people::PyPeople,
         shape::{PyClosestPoints, PyShape},
         sites::{PySiteGate, PySiteRay, expected_sites},
         skeleton::{cylinders, euler_angles, joint_angles, moved_covariances, placed, quaternions, skeleton},
         skin::PySkinCue,
-        template::{Template, with_values},
+        template::{Template, people_text},
         tracker::{PyTracker, body_before},
     };
 

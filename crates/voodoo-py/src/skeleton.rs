@@ -10,12 +10,15 @@ use crate::arrays::{Array, array};
 use crate::body::{PyBody, at_rest};
 use crate::errors::MeasurementError;
 
-type Given<'py> = PyReadonlyArrayDyn<'py, f64>;
+pub(crate) type Given<'py> = PyReadonlyArrayDyn<'py, f64>;
 /// A table of numbers, which is read faster than tuples.
-type Plan<'py> = PyReadonlyArray2<'py, i64>;
+pub(crate) type Plan<'py> = PyReadonlyArray2<'py, i64>;
 
 /// Rows of `N` numbers of each frame of an array (F, K, ...).
-fn frames<'a, const N: usize>(name: &str, array: &'a PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<&'a [[f64; N]]>> {
+pub(crate) fn frames<'a, const N: usize>(
+    name: &str,
+    array: &'a PyReadonlyArrayDyn<'_, f64>,
+) -> PyResult<Vec<&'a [[f64; N]]>> {
     let shape = array.shape();
     if shape.len() < 2 || shape[2..].iter().product::<usize>() != N || !array.is_c_contiguous() {
         let text = format!("contiguous frames of rows of {N} numbers, found shape {shape:?}");
@@ -26,7 +29,7 @@ fn frames<'a, const N: usize>(name: &str, array: &'a PyReadonlyArrayDyn<'_, f64>
 }
 
 /// Rows of a plan.
-fn plan<'a, const N: usize>(plan: &'a Plan<'_>) -> PyResult<&'a [[i64; N]]> {
+pub(crate) fn plan<'a, const N: usize>(plan: &'a Plan<'_>) -> PyResult<&'a [[i64; N]]> {
     match plan.shape()[1] {
         columns if columns == N && plan.is_c_contiguous() => Ok(plan.as_slice()?.as_chunks().0),
         columns => Err(wrong("plan", &format!("{N} columns, found {columns}"))),
@@ -42,11 +45,11 @@ fn wrong(name: &str, expected: &str) -> PyErr {
     MeasurementError::new_err(format!("{name}: expected {expected}"))
 }
 
-fn unplanned() -> PyErr {
+pub(crate) fn unplanned() -> PyErr {
     wrong("plan", "numbers of limbs, joints and frames that are there, and axes that differ")
 }
 
-fn rotation(rows: &[f64; 9]) -> Mat3 {
+pub(crate) fn rotation(rows: &[f64; 9]) -> Mat3 {
     Mat3::from_cols_array(rows).transpose()
 }
 
@@ -55,25 +58,28 @@ fn rows_of(rotation: &Mat3) -> [f64; 9] {
 }
 
 /// Rotation and translation of a 4x4 matrix.
-fn parts(m: &[f64; 16]) -> (Mat3, Vec3) {
+pub(crate) fn parts(m: &[f64; 16]) -> (Mat3, Vec3) {
     (rotation(&[m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]]), Vec3::new(m[3], m[7], m[11]))
 }
 
 /// Rotations of the bones of a posed body, and where they are joined to their parents.
-fn bones(body: &Body, poses: &[[f64; 16]], joints: &[[f64; 3]], own: &[[i64; 2]]) -> Option<(Vec<Mat3>, Vec<Vec3>)> {
-    let found = at_rest(body).into_iter().zip(poses).map(|((rest, place), pose)| {
-        let (limb, at) = parts(pose);
-        (limb * rest.transpose(), limb * place + at)
-    });
+pub(crate) fn bones(
+    body: &Body,
+    poses: &[(Mat3, Vec3)],
+    joints: &[Vec3],
+    own: &[[i64; 2]],
+) -> Option<(Vec<Mat3>, Vec<Vec3>)> {
+    let found = at_rest(body).into_iter().zip(poses);
+    let found = found.map(|((rest, place), &(limb, at))| (limb * rest.transpose(), limb * place + at));
     let (turns, mut heads): (Vec<_>, Vec<_>) = found.unzip();
     for &[limb, joint] in own {
-        *heads.get_mut(usize::try_from(limb).ok()?)? = Vec3::from_array(*entry(joints, joint)?);
+        *heads.get_mut(usize::try_from(limb).ok()?)? = *entry(joints, joint)?;
     }
     (turns.len() == body.limbs().len() && poses.len() == turns.len()).then_some((turns, heads))
 }
 
 /// Places of frames; and place and quaternion of each on its parent.
-fn placed_frames(turns: &[Mat3], points: &[Vec3], plan: &[[i64; 4]]) -> Option<(Vec<Vec3>, Vec<[f64; 7]>)> {
+pub(crate) fn placed_frames(turns: &[Mat3], points: &[Vec3], plan: &[[i64; 4]]) -> Option<(Vec<Vec3>, Vec<[f64; 7]>)> {
     let there = |&[limb, first, second, _]: &[i64; 4]| {
         Some((*entry(turns, limb)?, (*entry(points, first)? + *entry(points, second)?) / 2.0))
     };
@@ -95,35 +101,55 @@ fn each<'a>(bodies: &'a [PyRef<'_, PyBody>]) -> impl Iterator<Item = &'a Body> {
     again.map(|body| &body.0)
 }
 
-fn angles(turns: &[Mat3], plan: &[[i64; 8]]) -> Option<Vec<f64>> {
+pub(crate) fn angles(turns: &[Mat3], plan: &[[i64; 8]]) -> Option<Vec<f64>> {
     let wrapped = |angle: f64| (angle + PI).rem_euclid(2.0 * PI) - PI;
-    let angle = |&[above, limb, first, second, third, which, sign, shifted]: &[i64; 8]| {
-        let quaternion = math::quaternion(&(entry(turns, above)?.transpose() * *entry(turns, limb)?));
-        let found = if first < 0 {
-            wrapped(2.0 * quaternion[1].atan2(quaternion[3]))
-        } else {
-            let order = [usize::try_from(first).ok()?, usize::try_from(second).ok()?, usize::try_from(third).ok()?];
-            *entry(&are_axes(order).then(|| math::euler_angles(&quaternion, order))?, which)?
+    let mut last: Option<(&[i64], [f64; 3])> = None;
+    let angle = |row| {
+        let &[above, limb, first, second, third, which, sign, shifted] = row;
+        // Angles of the same joint follow each other.
+        let (joint, _) = row.split_at(5);
+        let found = match last {
+            Some((same, found)) if same == joint => found,
+            _ => {
+                let quaternion = math::quaternion(&(entry(turns, above)?.transpose() * *entry(turns, limb)?));
+                if first < 0 {
+                    [wrapped(2.0 * quaternion[1].atan2(quaternion[3])); 3]
+                } else {
+                    let order = [first, second, third].map(|axis| usize::try_from(axis).unwrap_or(usize::MAX));
+                    are_axes(order).then(|| math::euler_angles(&quaternion, order))?
+                }
+            }
         };
+        last = Some((joint, found));
+        let found = *entry(&found, which)?;
         let found = if shifted != 0 { wrapped(found + PI) } else { found };
         Some(if sign < 0 { -found } else { found })
     };
     plan.iter().map(angle).collect()
 }
 
-/// The covariance of a pose, place before turn, of another point, which is away from its point.
-fn moved_covariance(covariance: &[[f64; 6]; 6], across: Vec3) -> [[f64; 6]; 6] {
+/// The covariance of a pose, place before turn, of another point, which is away from its point; turned before.
+pub(crate) fn moved_covariance(covariance: &[[f64; 6]; 6], turn: &Mat3, across: Vec3) -> [[f64; 6]; 6] {
     let [x, y, z] = across.to_array();
     let lever = Mat3::from_cols(Vec3::new(0.0, -z, y), Vec3::new(z, 0.0, -x), Vec3::new(-y, x, 0.0));
     let moved = |column: [f64; 6]| {
         let [a, b, c, d, e, f] = column;
-        let [a, b, c] = (Vec3::new(a, b, c) + lever * Vec3::new(d, e, f)).to_array();
+        let (place, angle) = (*turn * Vec3::new(a, b, c), *turn * Vec3::new(d, e, f));
+        let ([a, b, c], [d, e, f]) = ((place + lever * angle).to_array(), angle.to_array());
         [a, b, c, d, e, f]
     };
     let transposed =
         |rows: &[[f64; 6]; 6]| [0, 1, 2, 3, 4, 5].map(|at: usize| std::array::from_fn(|row| rows[row][at]));
     let half: [[f64; 6]; 6] = transposed(covariance).map(moved);
     transposed(&half).map(moved)
+}
+
+/// Middle, rotation x, y, z, w, both diameters, length, and scales of both ends of a limb's cylinder.
+pub(crate) fn cylinder(Limb { shape, .. }: &Limb, &(turn, at): &(Mat3, Vec3)) -> [f64; 12] {
+    let ([x, y, z], [i, j, k, w]) = ((at + turn.z_axis * (shape.length() / 2.0)).to_array(), math::quaternion(&turn));
+    let (a, b) = (shape.a0() + shape.a1(), shape.b0() + shape.b1());
+    let low = shape.a0() / a + shape.b0() / b;
+    [x, y, z, i, j, k, w, a, b, shape.length(), low, 2.0 - low]
 }
 
 #[doc = stub!("skeleton")]
@@ -138,7 +164,9 @@ pub(crate) fn skeleton<'py>(
     let (poses, joints, own) = (frames("poses", &poses)?, frames("joints", &joints)?, plan(&own)?);
     let (mut turns, mut heads) = (Vec::new(), Vec::new());
     for ((poses, joints), body) in poses.iter().zip(&joints).zip(each(&bodies)) {
-        let found = bones(body, poses, joints, own).ok_or_else(unplanned)?;
+        let poses: Vec<_> = poses.iter().map(parts).collect();
+        let joints: Vec<_> = joints.iter().copied().map(Vec3::from_array).collect();
+        let found = bones(body, &poses, &joints, own).ok_or_else(unplanned)?;
         turns.extend(found.0.iter().flat_map(rows_of));
         heads.extend(found.1.iter().flat_map(Vec3::to_array));
     }
@@ -193,7 +221,7 @@ pub(crate) fn moved_covariances<'py>(
         let (Ok(covariance), &[x, y, z]) = ((*covariance).try_into(), &across.to_vec()[..]) else {
             return Err(wrong("covariances", "shapes (F, 6, 6) and (F, 3)"));
         };
-        moved.extend(moved_covariance(covariance, Vec3::new(x, y, z)).into_iter().flatten());
+        moved.extend(moved_covariance(covariance, &Mat3::IDENTITY, Vec3::new(x, y, z)).into_iter().flatten());
     }
     array(py, moved, &[covariances.len(), 6, 6])
 }
@@ -209,14 +237,7 @@ pub(crate) fn cylinders<'py>(
     let limbs = bodies.first().map_or(0, |body| body.0.limbs().len());
     let mut rows = Vec::new();
     for (poses, body) in poses.iter().zip(each(&bodies)) {
-        for (pose, Limb { shape, .. }) in poses.iter().zip(body.limbs()) {
-            let (turn, at) = parts(pose);
-            let (a, b) = (shape.a0() + shape.a1(), shape.b0() + shape.b1());
-            let low = shape.a0() / a + shape.b0() / b;
-            rows.extend((at + turn.z_axis * (shape.length() / 2.0)).to_array());
-            rows.extend(math::quaternion(&turn));
-            rows.extend([a, b, shape.length(), low, 2.0 - low]);
-        }
+        rows.extend(body.limbs().iter().zip(*poses).flat_map(|(limb, pose)| cylinder(limb, &parts(pose))));
     }
     array(py, rows, &[poses.len(), limbs * 12])
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
-from itertools import islice
+from itertools import accumulate, islice
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeAlias
@@ -26,8 +26,8 @@ SUFFIX = ".foxglove.mcap"
 TRANSFORMS, SCENE = "/tf", "/people"
 """Topics: foxglove.FrameTransforms and foxglove.SceneUpdate."""
 _JOINT_M = 0.04
-FoxglovePerson: TypeAlias = tuple[str, tuple[str, ...], tuple[int, ...], tuple[str, ...], int]
-"""REP-155 id, names and parents of `HumanFrames`, names of limbs, and number of joints and sites."""
+FoxgloveAbout: TypeAlias = tuple[tuple[str, ...], tuple[int, ...], tuple[str, ...], int, int]
+"""Of a person names and parents of `HumanFrames`, names of limbs, number of joints and sites, and of all given numbers."""
 
 
 def library(wanted: object) -> ModuleType:
@@ -65,17 +65,25 @@ class Channels:
         return bool(self._transforms.has_sinks() or self._scene.has_sinks())
 
     def log(
-        self, stamp: float, people: Sequence[FoxglovePerson], numbers: Sequence[FloatArray], root_frame: str
+        self,
+        stamp: float,
+        people: Sequence[str],
+        about: Sequence[FoxgloveAbout],
+        numbers: Sequence[FloatArray],
+        root_frame: str,
     ) -> None:
-        """Write a frame of those who are there, with `HumanFrames.on_parents` and `shapes_of` each; `root_frame` has z up."""
+        """Write a frame of those who are there, by their REP-155 ids; `root_frame` has z up. The numbers of each begin with
+        `HumanFrames.on_parents` and `shapes_of`."""
         at = round(stamp * 1e9)
-        made = self._template_of(tuple(people), root_frame)
+        made = self._template_of(tuple(people), tuple(about), root_frame)
         *transforms, scene = made.filled(numbers, _timestamp(*divmod(at, 1_000_000_000)))
         for message in transforms:
             self._transforms.log(message, log_time=at)
         self._scene.log(scene, log_time=at)
 
-    def _make_template(self, people: tuple[FoxglovePerson, ...], root_frame: str) -> _core.Template:
+    def _make_template(
+        self, people: tuple[str, ...], about: tuple[FoxgloveAbout, ...], root_frame: str
+    ) -> _core.Template:
         """Messages of persons: transforms, if somebody is there, and the scene."""
         m = self._messages
         time = m.Timestamp(*divmod(STAMP_NS, 1_000_000_000))
@@ -96,9 +104,12 @@ class Channels:
         def sphere(row: list[float]) -> Any:  # noqa: ANN401
             return m.SpherePrimitive(pose=pose([*row, 0.0, 0.0, 0.0, 1.0]), size=size, color=red)
 
-        def encode(numbers: list[float]) -> list[bytes]:
-            left, transforms, entities = iter(numbers), [], []
-            for person, names, parents, limbs, joints in people:
+        ends = [0, *accumulate(of[-1] for of in about)]
+
+        def encode(numbers: FloatArray) -> list[bytes]:
+            transforms, entities = [], []
+            for person, first, (names, parents, limbs, joints, _) in zip(people, ends[:-1], about, strict=True):
+                left = iter(numbers[first:].tolist())
                 placed = placed_names(names, parents, person, root_frame)
                 transforms += [transform(*pair, list(islice(left, 7))) for pair in placed]
                 cylinders = [cylinder(limb, list(islice(left, 12))) for limb in limbs]
@@ -108,8 +119,7 @@ class Channels:
             scene = m.SceneUpdate(deletions=[before], entities=entities)
             return [one.encode() for one in (*[m.FrameTransforms(transforms=transforms)] * bool(people), scene)]
 
-        count = sum(7 * len(names) + 12 * len(limbs) + 3 * joints for _, names, _, limbs, joints in people)
-        return template(encode, count, stamp=_timestamp(*divmod(STAMP_NS, 1_000_000_000)))
+        return template(encode, ends[-1], stamp=_timestamp(*divmod(STAMP_NS, 1_000_000_000)))
 
 
 def shapes_of(bodies: Sequence[Body], limb_poses: FloatArray, joints: FloatArray) -> FloatArray:
@@ -127,11 +137,9 @@ def shapes_of(bodies: Sequence[Body], limb_poses: FloatArray, joints: FloatArray
 
 def _timestamp(seconds: int, nanoseconds: int) -> bytes:
     """Fields of google.protobuf.Timestamp, always of the same length: seven bits a byte, the highest says that more follow."""
-    words = [
-        bytes([number >> 7 * place & 0x7F | 0x80 for place in range(4)] + [number >> 28])
-        for number in (seconds, nanoseconds)
-    ]
-    return b"\x08" + words[0] + b"\x10" + words[1]
+    s, n = seconds, nanoseconds
+    first = 0x08, s & 127 | 128, s >> 7 & 127 | 128, s >> 14 & 127 | 128, s >> 21 & 127 | 128, s >> 28
+    return bytes((*first, 0x10, n & 127 | 128, n >> 7 & 127 | 128, n >> 14 & 127 | 128, n >> 21 & 127 | 128, n >> 28))
 
 
 def _xyz(values: Iterable[float], names: str = "xyz") -> dict[str, float]:
@@ -159,18 +167,21 @@ def write_foxglove(
     foxglove = library(path)
     context = foxglove.Context()
     channels = Channels(foxglove, context)
-    frames: dict[float, tuple[list[FoxglovePerson], list[FloatArray]]] = {}
+    frames: dict[float, tuple[list[str], list[FoxgloveAbout], list[FloatArray]]] = {}
     root = root_frame
     for person, (track, body) in people.items():
         track, root = upright(track, root_frame, turn)
         found = track.of_frames(track.found)
         placed = human_frames(track.joint_names, found.joints, skeleton(found, body))
-        about = person, placed.names, placed.parents, track.limb_names, len(track.joint_names)
-        rows = zip(placed.on_parents, shapes_of([body], found.world_from_limb, found.joints), strict=True)
+        shapes = shapes_of([body], found.world_from_limb, found.joints)
+        width = 7 * len(placed.names) + shapes.shape[1]
+        about = placed.names, placed.parents, track.limb_names, len(track.joint_names), width
+        rows = zip(placed.on_parents, shapes, strict=True)
         for stamp, there in zip(track.stamps.tolist(), track.found.tolist(), strict=True):
-            persons, numbers = frames.setdefault(stamp, ([], []))
+            persons, abouts, numbers = frames.setdefault(stamp, ([], [], []))
             if there:
-                persons.append(about)
+                persons.append(person)
+                abouts.append(about)
                 numbers.extend(next(rows))
     with appearing_whole(Path(path)) as place, foxglove.open_mcap(str(place), context=context):
         for stamp in sorted(frames):

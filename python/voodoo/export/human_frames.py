@@ -36,7 +36,7 @@ class HumanFrames(NamedTuple):
 
 def human_frames(joint_names: tuple[str, ...], joints: FloatArray, posed: Skeleton) -> HumanFrames:
     """Frames of poses with joints (F, J, 3)."""
-    names, parents, plan = _plan(joint_names, posed.body.limb_tree)
+    names, parents, plan = frame_plan(joint_names, posed.body.limb_tree)
     points = np.concatenate([posed.heads, joints], axis=1)
     return HumanFrames(names, parents, *_core.placed(posed.rotations, points, plan))
 
@@ -48,7 +48,7 @@ def placed_names(names: Sequence[str], parents: Sequence[int], person: str, root
 
 
 @lru_cache(maxsize=64)
-def _plan(
+def frame_plan(
     joint_names: tuple[str, ...], limbs: tuple[tuple[str, int | None], ...]
 ) -> tuple[tuple[str, ...], tuple[int, ...], npt.NDArray[np.int64]]:
     """Of each frame the name; the parent; and the plan of `placed`: the limb it turns with, two points in the middle of which it
@@ -94,13 +94,13 @@ def joint_angles(posed: Skeleton) -> tuple[tuple[str, ...], FloatArray]:
     positive, knees to negative angles. The rest of their rotation is not in the angle (it is in /tf). The waist
     is 0: the torso is one limb.
     """
-    names, plan = _angle_plan(posed.body.limb_names)
+    names, plan = angle_plan(posed.body.limb_names)
     # Singular for a hanging arm; the third angle is then set to zero, which is one valid solution.
     return names, _core.joint_angles(posed.rotations, plan)
 
 
 @lru_cache(maxsize=16)
-def _angle_plan(limbs: tuple[str, ...]) -> tuple[tuple[str, ...], npt.NDArray[np.int64]]:
+def angle_plan(limbs: tuple[str, ...]) -> tuple[tuple[str, ...], npt.NDArray[np.int64]]:
     """Names of joints, and how their angles are found."""
     numbers, rows = {limb: number for number, limb in enumerate(limbs)}, turns_of(limbs)
     # On the right they are the other of the two solutions, so that abduction is positive on both sides.

@@ -128,12 +128,12 @@ def skeleton_of(
 ) -> Skeleton:
     """The skeleton of F poses (F, L, 4, 4) with joints (F, J, 3) of a body, or of persons of one instant with a body each."""
     poses, joints = (np.ascontiguousarray(one, dtype=np.float64) for one in (poses, joints))
-    own = _own(bodies[0].limb_joints, joint_names)
+    own = own_joints(bodies[0].limb_joints, joint_names)
     return Skeleton(bodies[0], stamps, *_core.skeleton([body.core for body in bodies], poses, joints, own))
 
 
 @lru_cache(maxsize=64)
-def _own(joints: tuple[str | None, ...], names: tuple[str, ...]) -> npt.NDArray[np.int64]:
+def own_joints(joints: tuple[str | None, ...], names: tuple[str, ...]) -> npt.NDArray[np.int64]:
     """Limbs whose joint to the parent has a position of its own, and the number of that."""
     own = [(index, names.index(joint)) for index, joint in enumerate(joints) if joint in names]
     return np.array(own, dtype=np.int64).reshape(-1, 2)

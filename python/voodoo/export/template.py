@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 import voodoo._core as _core
+from voodoo.measurements import FloatArray
 
 STAMP_NS = 1_234_567_890_500_000_000
 """Time in a message that becomes a template."""
@@ -15,15 +16,14 @@ _FIRST = 1_000_000.0
 
 
 def template(
-    encode: Callable[[list[float]], Sequence[bytes]], count: int, *, single: bool = False, stamp: bytes = b""
+    encode: Callable[[FloatArray], Sequence[bytes]], count: int, *, single: bool = False, stamp: bytes = b""
 ) -> _core.Template:
     """The template of the messages of an instant.
 
     Args:
-        encode: makes the messages of some numbers, each of which is in them once, at STAMP_NS.
+        encode: makes the messages of some numbers at STAMP_NS.
         count: how many.
         single: they are stored in single precision, see _core.Template.
         stamp: how STAMP_NS is stored; b"" without stamps.
     """
-    numbers = _FIRST + np.arange(count, dtype=np.float64)
-    return _core.Template(encode(numbers.tolist()), numbers, single, stamp)
+    return _core.Template(encode(_FIRST + np.arange(count, dtype=np.float64)), _FIRST, count, single, stamp)

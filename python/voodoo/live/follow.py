@@ -189,7 +189,7 @@ class Upright:
             optical = is_optical(root) or (own and root not in LEVEL_FRAMES)
             self._turn = by_axes(root, optical=optical)
             self._sight = FloorSight() if optical else None
-        there = [one for one in step.estimates.values() if one.joints]
+        there = [one for one in step.estimates.values() if one.status != "searching"]
         self._steps += bool(there)
         if not there or self._steps % EVERY or self._steps > _LOOKS * EVERY:
             return self._turn

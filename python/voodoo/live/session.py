@@ -223,7 +223,7 @@ class Session:
         now = self.live.clock.now()
         self.latency.add(now - step.frame.taken)
         self.published += 1
-        self.with_pose += any(one.joints for one in step.estimates.values())
+        self.with_pose += any(one.status != "searching" for one in step.estimates.values())
         self._times.append(now)
         self._first = now if self._first is None else self._first
         self._last = step

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import threading
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -92,10 +93,12 @@ def _field(node: Any) -> Any:  # noqa: ANN401
     return bool if name == "bool" else getattr(types, "uint8" if name in _BYTES else name)
 
 
-_LOOPBACK = """<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces>
+_LOOPBACK = """<General><Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces>
 <AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>
-<MaxAutoParticipantIndex>60</MaxAutoParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers></Discovery>
-<Internal><SocketReceiveBufferSize min="default"/></Internal></Domain></CycloneDDS>"""
+<MaxAutoParticipantIndex>60</MaxAutoParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers></Discovery>"""
+_SETTINGS = """<CycloneDDS><Domain>{}<Internal><SocketReceiveBufferSize min="default"/>
+<HeartbeatInterval>300 ms</HeartbeatInterval></Internal></Domain></CycloneDDS>"""
+"""A message that follows a lost one asks for it; only the last one before a pause waits for a heartbeat, which wakes threads."""
 _MS = 1_000_000
 _domains: dict[int, Any] = {}
 _quiet: set[str] = set()
@@ -155,9 +158,11 @@ class Node:
 
         number = domain_id()
         try:
-            with _lock:
-                if number not in _domains and on_loopback() and not os.environ.get("CYCLONEDDS_URI"):
-                    _domains[number] = Domain(number, _LOOPBACK)
+            alone = on_loopback()
+            # Other code of this process may have joined before.
+            with _lock, nullcontext() if alone else suppress(DDSException):
+                if number not in _domains and not os.environ.get("CYCLONEDDS_URI"):
+                    _domains[number] = Domain(number, _SETTINGS.format(_LOOPBACK if alone else ""))
             self._participant = DomainParticipant(number)
             self._publications = BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication)
             self._waitset = WaitSet(self._participant)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from voodoo.errors import VoodooError
-from voodoo.export.foxglove import Channels, library, shapes_of
-from voodoo.export.ros2 import person_id
+from voodoo.export.foxglove import Channels, library
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
 from voodoo.live.sinks import parts_of
@@ -51,14 +50,9 @@ class FoxgloveSink(Output):
         """See Output."""
         if not self._channels.are_wanted:
             return
-        people, persons, numbers = shown(step, self._root()), [], []
-        if people.present:
-            names, parents, _, on_parents = people.frames
-            about = names, parents, people.posed.body.limb_names, people.joints.shape[1]
-            shapes = shapes_of(people.bodies, people.limb_poses, people.joints)
-            persons = [(person_id(people.numbers[index]), *about) for index in people.present]
-            numbers = [part for index in people.present for part in (on_parents[index], shapes[index])]
-        self._channels.log(step.stamp, persons, numbers, people.frame)
+        people = shown(step, self._root())
+        about = [] if people.layout is None else [people.layout.shapes] * len(people.there)
+        self._channels.log(step.stamp, people.ids, about, [people.rows_there], people.frame)
 
     def close(self) -> None:
         """See Output."""

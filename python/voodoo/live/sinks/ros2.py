@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import struct
 from collections.abc import Callable, Mapping
 from functools import lru_cache
-from itertools import islice
+from itertools import compress, repeat
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from voodoo.export.template import STAMP_NS, template
 from voodoo.live.follow import Step
 from voodoo.live.ros2.dds import Node, Offer, Publication
 from voodoo.live.session import Output
-from voodoo.live.sinks.people import shown
+from voodoo.live.sinks.people import Layout, shown
 from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.model.body import Body
 from voodoo.pipeline.front_end import nobody
@@ -90,19 +89,11 @@ class Ros2Sink(Output):
         """See Output."""
         root = self._root()
         people = shown(step, root)
-        frame = people.frame
-        observed: dict[int, Body] = {}
-        about: tuple[Any, ...] = (), (), (), ()
-        numbers: list[FloatArray] = []
-        if there := people.present:
-            observed = {people.numbers[index]: people.bodies[index] for index in there}
-            (joints, angles), (names, parents, _, rows), sigmas = people.angles, people.frames, people.covariances
-            sure = [index for index in there if math.isfinite(sigmas[index, 0, 0])]
-            about = tuple(ros2.person_id(people.numbers[index]) for index in sure), names, parents, joints
-            numbers = [np.array(ros2.root_on_parent(people.turn.pose))] if frame != root else []
-            numbers += [rows[index] for index in there] + [angles[index] for index in there]
-            numbers += [part for index in sure for part in (rows[index, 0], sigmas[index])]
-        publications, made = self._template_of(tuple(map(ros2.person_id, observed)), root, frame, *about)
+        frame, numbers = people.frame, [people.rows_there]
+        observed = {number: step.bodies[number] for number in people.there}
+        if observed and frame != root:
+            numbers.append(np.array(ros2.root_on_parent(people.turn.pose)))
+        publications, made = self._template_of(people.ids, people.sure, root, frame, people.layout)
         # Together: what follows takes longer, and the network wakes once.
         messages = made.filled(numbers, _stamp(round(step.stamp * 1e9)))
         for publication, message in zip(publications, messages, strict=True):
@@ -143,34 +134,32 @@ class Ros2Sink(Output):
                 self._described[number] = size
 
     def _make_template(
-        self,
-        ids: tuple[str, ...],
-        root: str,
-        frame: str,
-        sure: tuple[str, ...],
-        names: tuple[str, ...],
-        parents: tuple[int, ...],
-        joints: tuple[str, ...],
+        self, ids: tuple[str, ...], sure: tuple[bool, ...], root: str, frame: str, layout: Layout | None
     ) -> tuple[list[Publication], _core.Template]:
         """Topics, and the messages on them, of persons of whom some have a covariance."""
+        known = list(compress(ids, sure))
         topics = [("/tf", ros2.TF)] * bool(ids)
         topics += [(f"{ros2.BODIES}/{person}/joint_states", ros2.JOINTS) for person in ids]
-        topics += [(f"{ros2.BODIES}/{person}/pose", ros2.POSE) for person in sure]
+        topics += [(f"{ros2.BODIES}/{person}/pose", ros2.POSE) for person in known]
         topics += [(topic, ros2.IDS) for topic in ros2.TRACKED]
-        placed = [(root, frame)] * (frame != root) if ids else []
-        placed += [pair for person in ids for pair in placed_names(names, parents, person, frame)]
+        count = len(ids) * sum(layout.widths) if layout else 0
 
-        def encode(numbers: list[float]) -> list[bytes]:
-            left, at = iter(numbers), STAMP_NS / 1e9
-            rows = [(*pair, list(islice(left, 7))) for pair in placed]
-            messages = [ros2.transforms_message(at, rows)] if ids else []
-            for person in ids:
-                messages.append(ros2.joint_message(at, person, joints, list(islice(left, len(joints)))))
-            messages += [ros2.pose_message(at, frame, list(islice(left, 7)), list(islice(left, 36))) for _ in sure]
-            return [ros2.cdr(one) for one in (*messages, *ros2.tracked(at, ids, root_frame=root).values())]
+        def encode(numbers: FloatArray) -> list[bytes]:
+            at, messages = STAMP_NS / 1e9, list(ros2.tracked(STAMP_NS / 1e9, ids, root_frame=root).values())
+            if layout and ids:
+                frames, *_, angles, covariances, _ = layout.parts(numbers[:count])
+                rows = [(root, frame, numbers[count:].tolist())] * (frame != root)
+                for person, of_person in zip(ids, frames.tolist(), strict=True):
+                    placed = placed_names(*layout.shapes[:2], person, frame)
+                    rows += [(*pair, row) for pair, row in zip(placed, of_person, strict=True)]
+                about = [ros2.joint_message(at, *one) for one in zip(ids, repeat(layout.angles), angles)]
+                poses = compress(zip(frames[:, 0].tolist(), covariances, strict=True), sure)
+                about += [ros2.pose_message(at, frame, *one) for one in poses]
+                messages = [ros2.transforms_message(at, rows), *about, *messages]
+            return [ros2.cdr(one) for one in messages]
 
-        count = 7 * len(placed) + len(ids) * len(joints) + 43 * len(sure)
-        return [self._publish_on(*one) for one in topics], template(encode, count, stamp=_stamp(STAMP_NS))
+        turned = 7 if ids and frame != root else 0
+        return [self._publish_on(*one) for one in topics], template(encode, count + turned, stamp=_stamp(STAMP_NS))
 
     def _publish_on(self, topic: str, kind: str, depth: int = 10) -> Publication:
         if topic not in self._topics:

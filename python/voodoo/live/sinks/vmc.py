@@ -12,25 +12,18 @@ from contextlib import suppress
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
 import voodoo._core as _core
 from voodoo.errors import VoodooError, installed, reading
 from voodoo.export.conventions import NAMES, names_of
-from voodoo.export.skeleton import FloatArray, Skeleton
 from voodoo.export.template import template
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
 from voodoo.live.sinks import parts_of
-from voodoo.live.sinks.people import shown
-from voodoo.model.rotations import matrix_of_turn
+from voodoo.live.sinks.people import Layout, shown
+from voodoo.measurements import FloatArray
 
 PORT = 39539
-_AXES, _SIGNS = np.array([1, 2, 0, 4, 5, 3, 6]), np.array([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0])
-"""Place X, Y, Z and rotation X, Y, Z, W of Unity, left-handed, from those with x forward, y left, z up."""
-_TURN = np.pi / 2.0
-"""At rest our arms hang; those of a VRM avatar point to the sides, a quarter turn about the forward axis."""
-_ARM = ("upperarm", "forearm", "hand")
 _NEEDED = ("Hips", "Head", *(f"{side}Upper{limb}" for side in ("Left", "Right") for limb in ("Arm", "Leg")))
 _TOGETHER = 15
 """Messages a datagram: it fits into one packet of Ethernet."""
@@ -74,23 +67,24 @@ class VmcSink(Output):
             OSError: nobody receives.
         """
         self._start = step.stamp if self._start is None else self._start
-        people, numbers = shown(step, self._root()), np.empty(0)
-        names: tuple[str, ...] = ()
-        if people.present:
-            first = min(people.present, key=people.numbers.__getitem__)
-            names, numbers = bones_of(people.posed, first, self.name)
-        for datagram in self._template_of(names).filled([np.array([step.stamp - self._start]), numbers], b""):
+        people, numbers = shown(step, self._root()), [np.array([step.stamp - self._start])]
+        if people.there:
+            numbers.append(people.rows_there[people.there.index(min(people.there))])
+        for datagram in self._template_of(people.layout if people.there else None).filled(numbers, b""):
             with suppress(BlockingIOError):
                 self._socket.send(datagram)
 
-    def _make_template(self, names: tuple[str, ...]) -> _core.Template:
-        return template(lambda numbers: self._datagrams(names, numbers), 1 + 7 * len(names), single=True)
+    def _make_template(self, layout: Layout | None) -> _core.Template:
+        width = sum(layout.widths) if layout else 0
+        return template(lambda numbers: self._datagrams(layout, numbers), 1 + width, single=True)
 
-    def _datagrams(self, names: tuple[str, ...], numbers: list[float]) -> list[bytes]:
-        """Messages of the time and of bones, whose seven numbers each follow it."""
-        messages: list[tuple[str | float, ...]] = [("/OK", int(bool(names))), ("/T", numbers[0])]
-        messages += [("/Root/Pos", "root", *(0.0,) * 6, 1.0)] if names else []
-        messages += [("/Bone/Pos", name, *numbers[7 * at + 1 : 7 * at + 8]) for at, name in enumerate(names)]
+    def _datagrams(self, layout: Layout | None, numbers: FloatArray) -> list[bytes]:
+        """Messages of the time and of the bones of a row that follows it."""
+        messages: list[tuple[str | float, ...]] = [("/OK", int(layout is not None)), ("/T", float(numbers[0]))]
+        if layout is not None:
+            rows = layout.parts(numbers[1:])[-1][0].tolist()
+            messages.append(("/Root/Pos", "root", *(0.0,) * 6, 1.0))
+            messages += [("/Bone/Pos", name, *rows[limb]) for name, limb in _bones(layout, self.name).items()]
         return [self._bundle(messages[first : first + _TOGETHER]) for first in range(0, len(messages), _TOGETHER)]
 
     def _bundle(self, messages: list[tuple[str | float, ...]]) -> bytes:
@@ -104,39 +98,22 @@ class VmcSink(Output):
         self._socket.close()
 
 
-def bones_of(posed: Skeleton, index: int, address: str) -> tuple[tuple[str, ...], FloatArray]:
-    """Names for /VMC/Ext/Bone/Pos, and position on the parent (3) [m] and rotation relative to it (4) as x, y, z, w of each.
-
-    Rotations of an avatar in T-pose that looks along the x axis of the world are the identity.
+def _bones(layout: Layout, address: str) -> dict[str, int]:
+    """Names for /VMC/Ext/Bone/Pos, and the limb of each, whose rotation in T-pose along the x axis of the world is the identity.
 
     Args:
-        posed: with z up.
-        index: of the frame.
+        layout: of the person.
         address: named in the error.
 
     Raises:
         VoodooError: the body lacks bones without which an avatar does not move.
     """
-    chosen, names, plan, arms = _avatar(posed.body.limb_tree, address)
-    _, rows = _core.placed((posed.rotations[index] @ arms)[None], posed.heads[index][None], plan)
-    return names, rows.take(chosen) * _SIGNS
-
-
-@lru_cache(maxsize=8)
-def _avatar(
-    limbs: tuple[tuple[str, int | None], ...], address: str
-) -> tuple[npt.NDArray[np.int64], tuple[str, ...], npt.NDArray[np.int64], FloatArray]:
-    """Of an avatar's bones the seven numbers among those of all limbs, and their names; of all limbs the plan of `placed` and the
-    turns to its rest pose."""
-    quarter = {"l": matrix_of_turn((-_TURN, 0.0, 0.0)), "r": matrix_of_turn((_TURN, 0.0, 0.0))}
-    arms = [quarter.get(limb[0], np.eye(3)) if limb.partition("_")[2] in _ARM else np.eye(3) for limb, _ in limbs]
-    rows = {names_of(limb).vrm: index for index, (limb, _) in enumerate(limbs)}
+    rows = {names_of(limb).vrm: index for index, (limb, _) in enumerate(layout.limbs)}
     rows.pop("", None)
     if missing := [name for name in _NEEDED if name not in rows]:
         needed = [limb for limb, names in NAMES.items() if names.vrm in missing and limb != "torso"]
         raise VoodooError(
             f"{address}: expected the body of a human, with the limbs {', '.join(needed)}, found "
-            f"{', '.join(limb for limb, _ in limbs)}"
+            f"{', '.join(limb for limb, _ in layout.limbs)}"
         )
-    plan = [(index, index, index, -1 if up is None else up) for index, (_, up) in enumerate(limbs)]
-    return 7 * np.array([[row] for row in rows.values()]) + _AXES, tuple(rows), np.array(plan), np.array(arms)
+    return rows

@@ -5,27 +5,24 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-import math
 import re
 import selectors
 import socket
+import struct
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import lru_cache
 from typing import Any
 from urllib.parse import parse_qs
-
-import numpy as np
 
 import voodoo._core as _core
 from voodoo.errors import VoodooError, installed
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
 from voodoo.live.sinks import parts_of
-from voodoo.live.sinks.people import shown
-from voodoo.model.rotations import quaternions
+from voodoo.live.sinks.people import Layout, shown
 
 FORMAT, VERSION = "voodoo.people", 1
 """The version is increased if earlier readers would misread a message, not for additional keys."""
@@ -77,7 +74,7 @@ class WebSocketSink(Output):
         """Start the server."""
         missing = f"{address}: expected websockets, found none; pip install 'voodoo-tracker[stream]'"
         server = installed("websockets.asyncio.server", missing)
-        self._left, self._broadcast = installed("websockets.exceptions", missing).ConnectionClosed, server.broadcast
+        self._left = installed("websockets.exceptions", missing).ConnectionClosed
         self.name, self.receiver, self.waits = address, True, False
         self._root, self._on_message = root_frame, on_message
         host, port, parts = parts_of(address, host="127.0.0.1", port=PORT)
@@ -102,30 +99,30 @@ class WebSocketSink(Output):
     def publish(self, step: Step) -> None:
         """See Output."""
         with self._lock:
-            if self._server.connections:
-                self._put(message_of(step, self._root()))
+            if connections := self._server.connections:
+                self._put(connections, _framed(message_of(step, self._root())))
 
     def _run(self) -> None:
         with self._lock:
             self._loop.run_forever()
 
-    def _put(self, text: str) -> None:
+    def _put(self, connections: Iterable[Any], frame: bytes) -> None:
         """Send to all who took what they were sent before."""
-        now, free = time.monotonic(), []
-        for connection in self._server.connections:
+        now = time.monotonic()
+        for connection in connections:
             since, named = self._late.pop(connection, (now, False))
-            if not connection.transport.get_write_buffer_size():
-                free.append(connection)
-                if named:
-                    self._on_message(f"{self._who(connection)} takes poses again")
+            transport = connection.transport
+            if transport.get_write_buffer_size():
+                if not named and now - since > _LATE_S:
+                    self._on_message(f"{self._who(connection)} takes nothing; it gets the newest pose when it does")
+                    named = True
+                self._late[connection] = since, named
                 continue
-            if not named and now - since > _LATE_S:
-                self._on_message(f"{self._who(connection)} takes nothing; it gets the newest pose when it does")
-                named = True
-            self._late[connection] = since, named
-        self._broadcast(free, text)
-        if any(one.transport.get_write_buffer_size() or one.transport.is_closing() for one in free):
-            self._loop.call_soon_threadsafe(bool)  # the loop has more to do
+            if named:
+                self._on_message(f"{self._who(connection)} takes poses again")
+            transport.write(frame)
+            if transport.get_write_buffer_size() or transport.is_closing():
+                self._loop.call_soon_threadsafe(bool)  # the loop has more to do
 
     async def _serve(self, connection: Any) -> None:  # noqa: ANN401 - of websockets
         """Wait until the receiver leaves; what it says is not heard."""
@@ -155,35 +152,33 @@ class WebSocketSink(Output):
         self._thread.join(_CLOSE_S)
 
 
-def message_of(step: Step, root_frame: str) -> str:
+def _framed(text: bytes) -> bytes:
+    """A text as a frame of a server (RFC 6455), once for all receivers."""
+    if len(text) < 126:
+        return struct.pack("!BB", 0x81, len(text)) + text
+    short = len(text) < 2**16
+    return struct.pack("!BBH" if short else "!BBQ", 0x81, 126 if short else 127, len(text)) + text
+
+
+def message_of(step: Step, root_frame: str) -> bytes:
     """The message of a step as JSON, see docs/how-to/stream.md."""
     people = shown(step, root_frame)
-    if not people.numbers:
-        return _core.with_values(_format(people.frame, (), (), ()), [], [repr(step.stamp)])
-    limbs, count = people.posed.body.limb_tree, len(people.numbers)
-    joint_names = tuple(people.estimates[0].joint_names)
-    # Whole numbers of 10 um and of 1e-6 are written several times as fast as others.
-    bones = np.concatenate([1e5 * people.posed.heads, 1e6 * quaternions(people.posed.rotations)], axis=2)
-    rows = np.concatenate([1e5 * people.joints.reshape(count, -1), bones.reshape(count, -1)], axis=1)
-    words = [repr(step.stamp)]
-    for estimate in people.estimates:
-        residual = estimate.residual
-        words += [estimate.status, repr(residual) if math.isfinite(residual) else "null"]
-        words += estimate.limb_status.values() or [""] * len(limbs)
-    return _core.with_values(_format(people.frame, people.numbers, joint_names, limbs), [rows], words)
+    numbers = [] if people.layout is None else [people.rows[:, people.layout.text]]
+    text = _format(people.frame, tuple(people.estimates), people.layout)
+    return _core.people_text(text, numbers, step.stamp, list(people.estimates.values()))
 
 
 _WRITTEN = {
-    "\0word": '"\1"', "\0value": "\1", "\0place": "[\0e-5, \0e-5, \0e-5]", "\0turn": "[\0e-6, \0e-6, \0e-6, \0e-6]",
+    "\0word": '"\1"', "\0value": "\1", "\0place": "[\0e-5, \0e-5, \0e-5]", "\0turn": "[\2e-6, \2e-6, \2e-6, \2e-6]",
 }  # fmt: skip
-"""Values of a message, and how they are formatted; names cannot begin like them."""
+"""Values of a message, and how they are formatted; names cannot begin like them. Whole numbers of 10 um and of 1e-6 are written
+several times as fast as others."""
 
 
 @lru_cache(maxsize=16)
-def _format(
-    frame: str, numbers: tuple[int, ...], joint_names: tuple[str, ...], limbs: tuple[tuple[str, int | None], ...]
-) -> str:
-    """A message in which only values are missing, which `with_values` fills in."""
+def _format(frame: str, numbers: tuple[int, ...], layout: Layout | None) -> bytes:
+    """A message in which only values are missing, which `people_text` fills in."""
+    limbs, joint_names = (layout.limbs, layout.joints) if layout else ((), ())
     bones = {
         name: {"parent": None if above is None else limbs[above][0], "position": "\0place", "rotation": "\0turn"}
         for name, above in limbs
@@ -195,4 +190,4 @@ def _format(
     text = json.dumps(whole)
     for value, written in _WRITTEN.items():
         text = text.replace(json.dumps(value), written)
-    return text
+    return text.encode()
