@@ -14,6 +14,7 @@ mod body;
 mod borrowed;
 mod camera;
 mod config;
+#[cfg(feature = "detect")]
 mod detect;
 mod detector;
 mod errors;
@@ -35,12 +36,14 @@ use pyo3::prelude::*;
 
 #[pymodule]
 mod _core {
+    #[cfg(feature = "detect")]
+    #[pymodule_export]
+    use super::detect::{PyCandidate, PyDetection, PyDetector, person_candidates};
     #[pymodule_export]
     use super::{
         body::PyBody,
         camera::{PyCamera, render_depth},
         config::config_fields,
-        detect::{PyCandidate, PyDetection, PyDetector, person_candidates},
         estimate::{_estimate, _nobody, PyEstimate},
         frame::PyFrame,
         ik::PyChain,
