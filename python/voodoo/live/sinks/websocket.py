@@ -8,7 +8,6 @@ import logging
 import re
 import selectors
 import socket
-import struct
 import threading
 import time
 from collections.abc import Callable, Iterable
@@ -75,6 +74,7 @@ class WebSocketSink(Output):
         missing = f"{address}: expected websockets, found none; pip install 'voodoo-tracker[stream]'"
         server = installed("websockets.asyncio.server", missing)
         self._left = installed("websockets.exceptions", missing).ConnectionClosed
+        self._frames = installed("websockets.frames", missing)
         self.name, self.receiver, self.waits = address, True, False
         self._root, self._on_message = root_frame, on_message
         host, port, parts = parts_of(address, host="127.0.0.1", port=PORT)
@@ -100,7 +100,8 @@ class WebSocketSink(Output):
         """See Output."""
         with self._lock:
             if connections := self._server.connections:
-                self._put(connections, _framed(message_of(step, self._root())))
+                frame = self._frames.Frame(self._frames.Opcode.TEXT, message_of(step, self._root()))
+                self._put(connections, frame.serialize(mask=False))  # once for all
 
     def _run(self) -> None:
         with self._lock:
@@ -150,14 +151,6 @@ class WebSocketSink(Output):
     def _end(self) -> None:
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join(_CLOSE_S)
-
-
-def _framed(text: bytes) -> bytes:
-    """A text as a frame of a server (RFC 6455), once for all receivers."""
-    if len(text) < 126:
-        return struct.pack("!BB", 0x81, len(text)) + text
-    short = len(text) < 2**16
-    return struct.pack("!BBH" if short else "!BBQ", 0x81, 126 if short else 127, len(text)) + text
 
 
 def message_of(step: Step, root_frame: str) -> bytes:
