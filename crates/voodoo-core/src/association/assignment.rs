@@ -4,7 +4,7 @@ use crate::association::correspondence::LimbMatches;
 use crate::association::nearest_limb::{NONE, NearestLimb};
 use crate::body::{Body, Limb};
 use crate::config::{Config, Overlap};
-use crate::math::{Points, Pose, vectorized};
+use crate::math::{Points, Pose, reset, vectorized};
 use crate::observation::candidates::{ANY_LIMB, Candidates};
 use crate::shape::Region;
 
@@ -96,6 +96,7 @@ impl Assignment {
             matches.candidate.extend((0..kept).map(|sample| members[sample * members.len() / kept]));
         }
         pick(candidates, matches);
+        reset(&mut matches.own, matches.candidate.len(), 1.0);
     }
 }
 

@@ -17,6 +17,9 @@ pub(crate) struct LimbMatches {
     pub base_weight: Vec<f32>,
     /// Weights, zero for rejected pairs.
     pub weight: Vec<f32>,
+    /// Probability that each point shows the limb, by the detection of the frame; 1 without one. It weighs points in the fit
+    /// only: poses are compared by what the sensors measure.
+    pub own: Vec<f32>,
     /// Closest points, normals, signed distances.
     pub surface: SurfaceBatch,
     /// Variance of the limb's radius, square meters.
@@ -157,6 +160,7 @@ impl LimbMatches {
         self.measured.reserve(len);
         self.base_weight.reserve(len.saturating_sub(self.base_weight.len()));
         self.weight.reserve(len.saturating_sub(self.weight.len()));
+        self.own.reserve(len.saturating_sub(self.own.len()));
         self.surface.reserve(len);
     }
 

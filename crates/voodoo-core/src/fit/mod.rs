@@ -276,12 +276,7 @@ impl Fit {
         let work = |(index, matches): (usize, &mut LimbMatches)| {
             if anew {
                 assignment.sample_limb(index, candidates, config, matches);
-                detected_limbs.weigh(
-                    index,
-                    limbs[index].shape.max_radius(),
-                    &matches.measured,
-                    &mut matches.base_weight,
-                );
+                detected_limbs.weigh(index, limbs[index].shape.max_radius(), &matches.measured, &mut matches.own);
             }
             matches.radius_variance = radius_variances.get(index).copied().unwrap_or_default();
             match_limb(&limbs[index], &poses[index], gate.distance, whole_body, matches);

@@ -88,12 +88,14 @@ impl Surface<'_> {
             &normals.z,
             &matches.surface.signed_distance,
             &matches.weight,
+            &matches.own,
         ];
         let count = matches.weight.len() / LANES;
-        let [x, y, z, nx, ny, nz, distance, weight] = columns.map(|column| &column.as_chunks::<LANES>().0[..count]);
+        let [x, y, z, nx, ny, nz, distance, weight, own] =
+            columns.map(|column| &column.as_chunks::<LANES>().0[..count]);
         // Written out, because an array's `map` within the loop is not inlined.
         for i in 0..count {
-            self.sum_block([x[i], y[i], z[i], nx[i], ny[i], nz[i], distance[i], weight[i]], &mut sums);
+            self.sum_block([x[i], y[i], z[i], nx[i], ny[i], nz[i], distance[i], weight[i], own[i]], &mut sums);
         }
         if count * LANES < matches.weight.len() {
             // Empty lanes have weight zero.
@@ -109,7 +111,7 @@ impl Surface<'_> {
     }
 
     #[inline(always)]
-    fn sum_block(&self, [x, y, z, nx, ny, nz, distance, weight]: [SurfaceLanes; 8], sums: &mut Sums) {
+    fn sum_block(&self, [x, y, z, nx, ny, nz, distance, weight, own]: [SurfaceLanes; 9], sums: &mut Sums) {
         let (information, tangential) = (self.information as f32, self.tangential_weight as f32);
         let inverse_square = (1.0 / (self.scale * self.scale)) as f32;
         let (mut pull, mut plane, mut iso) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
@@ -118,7 +120,7 @@ impl Surface<'_> {
         for l in 0..LANES {
             let square = distance[l] * distance[l];
             let falloff = 1.0 / (1.0 + square * inverse_square);
-            let weight = weight[l] * information;
+            let weight = weight[l] * own[l] * information;
             sums.cost[l] += weight * square * falloff;
             let weight = weight * falloff * falloff;
             // The residual n . (x - p) is the negative signed distance of the measured point.
@@ -258,7 +260,9 @@ mod tests {
         let mut matches = LimbMatches { radius_variance, ..LimbMatches::default() };
         for (foot, normal, distance, weight) in points {
             let f32s = |v: &Vec3| v.to_array().map(|value| value as f32);
-            matches.weight.push(*weight as f32);
+            // Half of them are the limb's own.
+            matches.weight.push(2.0 * *weight as f32);
+            matches.own.push(0.5);
             matches.surface.points.push(f32s(foot));
             matches.surface.normals.push(f32s(normal));
             matches.surface.signed_distance.push(*distance as f32);
