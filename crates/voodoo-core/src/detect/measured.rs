@@ -54,6 +54,7 @@ impl Detected<'_> {
             Some(DetectedBone { limb, ends: [end(limb)?, end(child)?] })
         };
         refill(bones, (0..body.limbs().len()).filter_map(bone));
+        bones.sort_unstable_by_key(|bone| bone.limb);
     }
 
     /// Writes the joints to `joints`, for a body that is expected at these poses, working frame.
@@ -87,9 +88,12 @@ impl DetectedLimbs {
     /// clothes, would hold or draw it.
     pub(crate) fn weigh(&self, limb: usize, radius: f64, points: &Points, weights: &mut [f32]) {
         let Some(visible) = self.visible.get(limb).copied().flatten() else { return };
+        // Bones are in the order of their limbs.
+        let first = self.bones.partition_point(|bone| bone.limb < limb);
+        let bones = &self.bones[first..self.bones.partition_point(|bone| bone.limb <= limb)];
         for (index, weight) in weights.iter_mut().enumerate() {
-            let bones = self.bones.iter().filter(|bone| bone.limb == limb);
-            let beyond = bones.map(|bone| bone.beyond(radius, points.get(index))).reduce(f64::min).unwrap_or(0.0);
+            let beyond =
+                bones.iter().map(|bone| bone.beyond(radius, points.get(index))).reduce(f64::min).unwrap_or(0.0);
             *weight *= (visible / (1.0 + (beyond / OWN_SIGMAS).powi(2)).powi(2)) as f32;
         }
     }
