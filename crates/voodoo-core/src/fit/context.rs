@@ -6,6 +6,7 @@ use crate::body::two_bone::TwoBone;
 use crate::config::Config;
 use crate::math::Pose;
 use crate::observation::observer::Observation;
+use crate::regions::Posed;
 
 /// One frame of one body. Cheap to copy.
 #[derive(Clone, Copy, Debug)]
@@ -22,7 +23,12 @@ pub(crate) struct Context<'a> {
     pub time_scale: f64,
 }
 
-impl Context<'_> {
+impl<'a> Context<'a> {
+    /// Returns the body at `poses`, working frame, at the time of the frame.
+    pub(crate) fn posed(self, poses: &'a [Pose]) -> Posed<'a> {
+        Posed { body: &self.model.body, poses, previous: self.previous, origin: self.observation.origin() }
+    }
+
     /// Returns the context with fewer points, where there are many.
     pub(crate) fn subsampled(self) -> Self {
         Self { observation: self.observation.with(self.observation.candidates.subsampled()), ..self }

@@ -2,7 +2,7 @@
 
 use super::{Context, Fit};
 use crate::math::Pose;
-use crate::regions::{ColorRegions, Posed};
+use crate::regions::ColorRegions;
 
 impl Fit {
     /// Returns the colors of limbs and surroundings.
@@ -18,7 +18,7 @@ impl Fit {
     /// Learns the colors in new cameras at the predicted pose.
     pub(crate) fn begin_regions(&mut self, context: Context, poses: &[Pose]) {
         if context.config.regions {
-            self.regions.begin(context.observation.frame(), posed(context, poses));
+            self.regions.begin(context.observation.frame(), context.posed(poses));
         }
     }
 
@@ -27,7 +27,7 @@ impl Fit {
         let Self { regions, correspondences, .. } = self;
         correspondences.regions.clear();
         if context.config.regions {
-            let (frame, posed) = (context.observation.frame(), posed(context, poses));
+            let (frame, posed) = (context.observation.frame(), context.posed(poses));
             regions.find_single_edges(frame, posed, &mut correspondences.regions);
         }
     }
@@ -45,7 +45,7 @@ impl Fit {
         correspondences.region_support.clear();
         let frame = context.observation.frame();
         if context.config.regions && !frame.colors.is_empty() {
-            regions.find(frame, posed(context, poses), step, |limb| context.uses_edges(limb), correspondences);
+            regions.find(frame, context.posed(poses), step, |limb| context.uses_edges(limb), correspondences);
         }
     }
 
@@ -54,11 +54,7 @@ impl Fit {
         if context.compares_colors() {
             let (frame, chains) = (context.observation.frame(), &context.model.extremities);
             let supports = &mut self.correspondences.region_support;
-            self.regions.pixel_gains(frame, posed(context, poses), chains, supports);
+            self.regions.pixel_gains(frame, context.posed(poses), chains, supports);
         }
     }
-}
-
-fn posed<'a>(context: Context<'a>, poses: &'a [Pose]) -> Posed<'a> {
-    Posed { body: &context.model.body, poses, previous: context.previous, origin: context.observation.origin() }
 }

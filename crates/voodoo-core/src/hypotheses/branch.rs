@@ -9,7 +9,7 @@ use super::objective::MARGIN;
 use super::refined::{REFINE, Refined};
 use crate::config::Config;
 use crate::fit::{Context, Fit, Motion};
-use crate::math::{Pose, Vec3, shifted};
+use crate::math::{Pose, Vec3, refill, shifted};
 use crate::terms::APART;
 
 /// Maximum number of cameras with a second branch. More cameras leave little of the body unobserved.
@@ -21,25 +21,16 @@ const LOOSER: f64 = 3.0;
 #[derive(Debug, Default)]
 pub(super) struct Branch {
     /// Its poses and their prediction, world frame. Without poses there is no second branch.
-    motion: Motion,
+    pub(super) motion: Motion,
     /// Its poses in this frame, their prediction and the previous ones, and the body with one arm or leg of the branch; working
     /// frame.
     poses: Vec<Pose>,
     predicted: Vec<Pose>,
     previous: Vec<Pose>,
-    tried: Vec<Pose>,
+    pub(super) tried: Vec<Pose>,
 }
 
 impl Branch {
-    /// Removes the branch until the next frame has been fitted, and reserves memory for `limbs` limbs.
-    pub(super) fn prepare(&mut self, limbs: usize) {
-        let Self { motion, poses, predicted, previous, tried } = self;
-        for poses in [&mut motion.poses, &mut motion.previous, poses, predicted, previous, tried] {
-            poses.clear();
-            poses.reserve(limbs);
-        }
-    }
-
     /// Fits the second branch to a frame, before the body itself is fitted. Afterwards, `fit` holds its correspondences. Returns
     /// the number of ICP steps.
     pub(super) fn follow(&mut self, context: Context, fit: &mut Fit) -> usize {
@@ -120,8 +111,7 @@ fn is_enabled(context: Context) -> bool {
 }
 
 fn set_shifted(to: &mut Vec<Pose>, from: &[Pose], origin: Vec3) {
-    to.clear();
-    to.extend(from.iter().map(|pose| shifted(pose, origin)));
+    refill(to, from.iter().map(|pose| shifted(pose, origin)));
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ use crate::association::correspondence::RegionSupport;
 use crate::body::{Body, Model};
 use crate::detect::Detected;
 use crate::fit::{Context, Fit, Motion};
-use crate::math::Pose;
+use crate::math::{Pose, make_room};
 use crate::terms::PATCH;
 use crate::visibility::LITTLE;
 use branch::Branch;
@@ -45,17 +45,11 @@ pub(crate) struct Hypotheses {
 }
 
 impl Hypotheses {
-    /// Forgets the last frame and reserves memory for another body.
-    pub(crate) fn restart(&mut self, model: &Model) {
-        let limbs = model.body.limbs().len();
+    /// Forgets the last frame, and the second branch until the next frame has been fitted.
+    pub(crate) fn restart(&mut self) {
         self.unexplained.clutter = 1.0;
-        // Reserved now, so that later steps do not allocate.
-        self.rough.prepare(limbs);
-        self.pool.prepare(limbs);
-        self.branch.prepare(limbs);
-        self.refined.prepare(limbs);
+        self.branch.motion.poses.clear();
         self.before.clear();
-        self.before.reserve(limbs);
     }
 
     /// Fits the second branch to a frame of few color images, before the body itself is fitted. Returns the number of ICP steps.
@@ -94,13 +88,17 @@ impl Hypotheses {
         self.unexplained.collect(context, fit.matched(poses));
         self.refined.clutter = self.unexplained.clutter;
         let (mut steps, by_colors) = (0, context.compares_colors());
-        for index in 0..context.model.extremities.len() {
-            let regions = by_colors.then_some(fit.regions());
-            let at = Extremity { context, matched: fit.matched(poses), regions, index };
+        for chain in &context.model.extremities {
+            let at = Extremity::new(context, fit, poses, chain);
             if !self.is_due(at) {
                 continue;
             }
-            self.propose(at, detection);
+            if by_colors {
+                let frame = context.observation.frame();
+                let is_other = |limb| chain.limbs().all(|own| own != limb);
+                fit.regions_mut().draw(frame, context.posed(poses), is_other);
+            }
+            self.propose(Extremity::new(context, fit, poses, chain), detection);
             let (taken, better) = self.try_proposals(context, fit, poses, predicted);
             steps += taken;
             if better {
@@ -130,24 +128,32 @@ impl Hypotheses {
         }
     }
 
-    /// Reserves memory for all candidates of the frame, so that later steps do not allocate.
+    /// Reserves memory for the body and all candidates of the frame, so that later steps do not allocate.
     fn make_room(&mut self, context: Context, fit: &Fit) {
-        let most = context.observation.candidates.len();
-        self.rough.score.make_room(most);
-        self.clusters.make_room(most);
-        if context.compares_colors() {
-            let (frame, limbs) = (context.observation.frame(), context.model.body.limbs().len());
-            for backdrop in [&mut self.rough.score.backdrop, &mut self.refined.backdrop] {
-                backdrop.make_room(frame, limbs);
-            }
-            self.color_directions.make_room(limbs);
+        let Self { rough, color_directions, pool: Pool { points, stretched, detected, .. }, refined, branch, .. } =
+            self;
+        let Refined { poses, tried, .. } = refined;
+        for poses in [
+            &mut rough.trial,
+            &mut color_directions.trial,
+            points,
+            stretched,
+            detected,
+            poses,
+            tried,
+            &mut branch.tried,
+        ] {
+            make_room(poses, context.model.body.limbs().len());
         }
+        let most = context.observation.candidates.len();
+        self.rough.make_room(most);
+        make_room(&mut self.clusters.apart, most);
         self.refined.matched.reserve(most.min(context.config.max_limb_points), fit.correspondences());
     }
 
     /// Whether the frame contradicts an arm or leg: its alternatives are tested.
     fn is_due(&mut self, at: Extremity) -> bool {
-        let chain = at.chain();
+        let chain = at.chain;
         if at.regions.is_some() {
             let supports = &at.matched.correspondences.region_support;
             let sum =
@@ -155,7 +161,7 @@ impl Hypotheses {
             let [gained, area]: [f64; 2] = [sum(|support| support.gained), sum(|support| support.area)];
             return gained < LITTLE * area;
         }
-        let near = &mut self.rough.score.unexplained;
+        let near = &mut self.rough.unexplained;
         self.unexplained.near(at.root(), chain.stretched_length(), near);
         PATCH * self.unexplained.clutter * near.total() >= MARGIN
     }
@@ -163,8 +169,8 @@ impl Hypotheses {
     /// Fills the pool with alternative configurations of one arm or leg.
     fn propose(&mut self, at: Extremity, detection: Option<Detected>) {
         let Self { rough, clusters, color_directions, pool, .. } = self;
-        rough.score.begin(at);
-        let current = rough.score.cost(at, at.matched.poses, f64::INFINITY);
+        rough.begin(at);
+        let current = rough.cost(at, at.matched.poses, f64::INFINITY);
         pool.begin(current);
         // All kinds of proposals. To add one, add a file in `proposals` and an element here.
         let kinds: [&mut dyn Propose; 3] = [clusters, color_directions, &mut DetectedEnd(detection)];
@@ -186,7 +192,7 @@ impl Hypotheses {
         }
         let (mut steps, mut improved, mut current) = (0, false, self.refined.cost(context, fit, poses));
         for proposal in self.pool.found() {
-            let (taken, better) = self.refined.replace(context, fit, poses, predicted, current, &proposal.poses);
+            let (taken, better) = self.refined.replace(context, fit, poses, predicted, current, proposal);
             steps += taken;
             if better {
                 improved = true;
@@ -210,7 +216,7 @@ mod tests {
         let (model, mut poses) = standing();
         let config = without_background();
         let (mut hypotheses, mut fit) = (Hypotheses::default(), Fit::new(&config).unwrap());
-        hypotheses.restart(&model);
+        hypotheses.restart();
         let mut found = Vec::new();
         for truth in frames {
             let (pixels, previous) = (before_wall(&model.body, truth), poses.clone());
@@ -260,7 +266,7 @@ mod tests {
             refined.clutter = 1.0;
             fit.match_last(context, &poses);
             let before = format!("{:?}", fit.correspondences());
-            let current = refined.cost(context, &fit, &poses);
+            let current = refined.cost(context, &mut fit, &poses);
             // One that is the current pose needs no step.
             for (tried, expected) in [(raised(&model, &poses, 0.2).0, REFINE), (poses.clone(), 0)] {
                 let (mut present, mut predicted) = (poses.clone(), poses.clone());

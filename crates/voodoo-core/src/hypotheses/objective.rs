@@ -3,7 +3,7 @@
 use crate::body::Body;
 use crate::fit::{Context, Matched};
 use crate::math::Pose;
-use crate::regions::{Backdrop, ColorRegions};
+use crate::regions::ColorRegions;
 use crate::solver::{LIMIT_SIGMA, OVERLAP_SIGMA, SITE_SCALE};
 use crate::terms::{
     Colors, DetectedJoints, Floor, FreeSpace, Limits, PATCH, Penetration, Regions, Sites, Stance, Surface, Term,
@@ -34,10 +34,17 @@ pub(crate) struct Objective<'a> {
 }
 
 impl<'a> Objective<'a> {
-    /// The objective of matched poses. An unexplained patch costs `clutter` times the usual. `colors` are the color images where
-    /// they compare poses.
-    pub(crate) fn new(context: Context<'a>, matched: Matched<'a>, clutter: f64, colors: Option<Colors<'a>>) -> Self {
-        let Context { model, observation, config, .. } = context;
+    /// The objective of matched poses. An unexplained patch costs `clutter` times the usual. `regions` are the color regions where
+    /// they compare poses, with the limbs drawn that are not compared, or the whole body.
+    pub(crate) fn new(
+        context: Context<'a>,
+        matched: Matched<'a>,
+        clutter: f64,
+        regions: Option<&'a ColorRegions>,
+    ) -> Self {
+        let Context { model, observation, config, previous, .. } = context;
+        let (frame, origin) = (observation.frame(), observation.origin());
+        let colors = regions.map(|regions| Colors { regions, frame, previous, origin });
         let Matched { correspondences, .. } = matched;
         let information = 1.0 / (config.point_sigma * config.point_sigma);
         let (tangential_weight, scale) = (config.tangential_weight, config.kernel_end);
@@ -75,12 +82,6 @@ impl<'a> Objective<'a> {
         let explained: f64 = limbs.clone().map(|limb| self.surface.cost(self.body, poses, limb)).sum();
         self.clutter * (PATCH * total + explained) + limbs.map(|limb| self.limb(poses, limb)).sum::<f64>()
     }
-}
-
-/// The color images of a frame, and the limbs drawn in them.
-pub(super) fn colors<'a>(context: Context<'a>, regions: &'a ColorRegions, backdrop: &'a Backdrop) -> Colors<'a> {
-    let Context { observation, previous, .. } = context;
-    Colors { regions, frame: observation.frame(), previous, origin: observation.origin(), backdrop }
 }
 
 #[cfg(test)]

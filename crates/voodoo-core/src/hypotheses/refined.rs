@@ -1,11 +1,10 @@
 //! Refinement of hypotheses by ICP, and comparison of their cost with that of the current pose.
 
-use super::objective::{MARGIN, Objective, colors};
+use super::objective::{MARGIN, Objective};
 use crate::association::correspondence::Correspondences;
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Fit};
-use crate::math::{Pose, Vec3};
-use crate::regions::{Backdrop, Posed};
+use crate::math::{Pose, Vec3, refill};
 
 /// Number of ICP steps that refine a hypothesis: more than a frame has, because a hypothesis starts farther from the solution.
 pub(crate) const REFINE: usize = 8;
@@ -21,23 +20,13 @@ pub(super) struct Refined {
     /// Correspondences that are exchanged with those of the fit: those of the current poses while the fit holds those of the
     /// hypothesis, and vice versa.
     pub(super) matched: Correspondences,
-    /// Label images of the whole body.
-    pub(super) backdrop: Backdrop,
     /// Cost of an unexplained patch in this frame, in those of a usual frame.
     pub(super) clutter: f64,
     /// A hypothesis after its ICP steps, while the current pose has as many.
-    tried: Vec<Pose>,
+    pub(super) tried: Vec<Pose>,
 }
 
 impl Refined {
-    /// Reserves memory for a body of `limbs` limbs.
-    pub(super) fn prepare(&mut self, limbs: usize) {
-        for poses in [&mut self.poses, &mut self.tried] {
-            poses.clear();
-            poses.reserve(limbs);
-        }
-    }
-
     /// Refines a hypothesis together with the whole body, and replaces the current pose `poses`, of cost `current`, and its
     /// prediction where that is another pose that explains the frame better. Any pose explains more after more ICP steps: before
     /// it is replaced, the current pose is refined as well, and the result is used if the hypothesis is no better. Returns the
@@ -60,8 +49,7 @@ impl Refined {
         std::mem::swap(&mut self.poses, &mut self.tried);
         let settled = self.refine(context, fit, poses);
         if cost < settled - MARGIN && is_another(context, &self.tried, &self.poses) {
-            predicted.clear();
-            predicted.extend_from_slice(hypothesis);
+            refill(predicted, hypothesis.iter().copied());
             poses.clone_from(&self.tried);
             fit.match_last(context, poses);
         } else if settled < current - MARGIN && is_another(context, &self.poses, poses) {
@@ -88,8 +76,7 @@ impl Refined {
         hypothesis: &[Pose],
         rival: Option<&[Pose]>,
     ) -> (usize, f64) {
-        self.poses.clear();
-        self.poses.extend_from_slice(hypothesis);
+        refill(&mut self.poses, hypothesis.iter().copied());
         fit.swap_matches(&mut self.matched);
         for step in 0..REFINE {
             if rival.is_some_and(|other| !is_another(context, &self.poses, other)) {
@@ -107,22 +94,17 @@ impl Refined {
             fit.solve(here, hypothesis, &mut self.poses, at);
         }
         fit.match_last(context, &self.poses);
-        let poses = std::mem::take(&mut self.poses);
-        let cost = self.cost(context, fit, &poses);
-        self.poses = poses;
-        (REFINE, cost)
+        (REFINE, self.cost(context, fit, &self.poses))
     }
 
     /// Cost of matched poses, nats.
-    pub(super) fn cost(&mut self, context: Context, fit: &Fit, poses: &[Pose]) -> f64 {
-        let Context { model, observation, previous, .. } = context;
+    pub(super) fn cost(&self, context: Context, fit: &mut Fit, poses: &[Pose]) -> f64 {
         let by_colors = context.compares_colors();
         if by_colors {
-            let posed = Posed { body: &model.body, poses, previous, origin: observation.origin() };
-            fit.regions().draw(observation.frame(), posed, |_| true, &mut self.backdrop);
+            fit.regions_mut().draw(context.observation.frame(), context.posed(poses), |_| true);
         }
-        let colors = by_colors.then(|| colors(context, fit.regions(), &self.backdrop));
-        Objective::new(context, fit.matched(poses), self.clutter, colors).body()
+        let regions = by_colors.then_some(fit.regions());
+        Objective::new(context, fit.matched(poses), self.clutter, regions).body()
     }
 }
 

@@ -2,13 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use super::objective::{Objective, colors};
+use super::objective::Objective;
 use super::rough_points::{ROUGH_SAMPLE, bounds, explain, may_explain, rough_cost};
 use crate::body::two_bone::TwoBone;
-use crate::fit::{Context, Matched};
-use crate::math::{Pose, Vec3, WeightedPoints};
-use crate::regions::{Backdrop, ColorRegions, Posed};
-use crate::terms::Colors;
+use crate::fit::{Context, Fit, Matched};
+use crate::math::{Pose, Vec3, WeightedPoints, make_room, refill, reset};
+use crate::regions::ColorRegions;
 
 /// The arm or leg under test, and the current poses of the body.
 #[derive(Clone, Copy, Debug)]
@@ -16,26 +15,31 @@ pub(super) struct Extremity<'a> {
     pub(super) context: Context<'a>,
     /// The current poses and their correspondences.
     pub(super) matched: Matched<'a>,
-    /// Color regions; `None` where points were measured.
+    /// Color regions, with the limbs drawn outside the arm or leg; `None` where points were measured.
     pub(super) regions: Option<&'a ColorRegions>,
-    /// Index among the extremities of the model.
-    pub(super) index: usize,
+    pub(super) chain: &'a TwoBone,
 }
 
 impl<'a> Extremity<'a> {
-    pub(super) fn chain(&self) -> &'a TwoBone {
-        &self.context.model.extremities[self.index]
+    pub(super) fn new(context: Context<'a>, fit: &'a Fit, poses: &'a [Pose], chain: &'a TwoBone) -> Self {
+        let regions = context.compares_colors().then_some(fit.regions());
+        Self { context, matched: fit.matched(poses), regions, chain }
     }
 
     /// Center of its ball joint, working frame.
     pub(super) fn root(&self) -> Vec3 {
-        self.chain().root(&self.context.model.body, self.matched.poses)
+        self.chain.root(&self.context.model.body, self.matched.poses)
+    }
+
+    /// The objective by which its configurations are compared.
+    pub(super) fn objective(&self) -> Objective<'a> {
+        Objective::new(self.context, self.matched, 1.0, self.regions)
     }
 }
 
-/// Points near one arm or leg for the rough cost, and working memory.
+/// Search for the configuration of an arm or leg with the lowest rough cost: the points near it, and working memory.
 #[derive(Debug, Default)]
-pub(super) struct RoughScore {
+pub(super) struct RoughSearch {
     /// Points that no limb explains.
     pub(super) unexplained: WeightedPoints,
     /// A subsample of these, and of the points that the arm or leg explains now and has to keep explaining.
@@ -45,18 +49,10 @@ pub(super) struct RoughScore {
     others: Vec<f32>,
     nearest: Vec<f32>,
     distances: Vec<f32>,
-    /// Label images of the limbs outside the arm or leg.
-    pub(super) backdrop: Backdrop,
+    pub(super) trial: Vec<Pose>,
 }
 
-/// Search for the configuration of an arm or leg with the lowest rough cost.
-#[derive(Debug, Default)]
-pub(super) struct RoughSearch {
-    pub(super) score: RoughScore,
-    trial: Vec<Pose>,
-}
-
-impl RoughScore {
+impl RoughSearch {
     /// Reserves memory for a frame of `count` candidates.
     pub(super) fn make_room(&mut self, count: usize) {
         for (points, count) in [(&mut self.unexplained, count), (&mut self.sample, 2 * count)] {
@@ -64,37 +60,16 @@ impl RoughScore {
             points.reserve(count);
         }
         for distances in [&mut self.others, &mut self.nearest, &mut self.distances] {
-            distances.clear();
-            distances.reserve(count);
+            make_room(distances, count);
         }
-    }
-
-    /// Draws the limbs outside the arm or leg into the backdrop.
-    fn draw_others(&mut self, at: Extremity) {
-        let Some(regions) = at.regions else { return };
-        let (chain, frame, poses) = (at.chain(), at.context.observation.frame(), at.matched.poses);
-        let Context { model, previous, .. } = at.context;
-        let posed = Posed { body: &model.body, poses, previous, origin: at.context.observation.origin() };
-        regions.draw(frame, posed, |limb| chain.limbs().all(|own| own != limb), &mut self.backdrop);
-    }
-
-    /// The color images, with the limbs outside the arm or leg.
-    fn colors<'a>(&'a self, at: Extremity<'a>) -> Option<Colors<'a>> {
-        at.regions.map(|regions| colors(at.context, regions, &self.backdrop))
-    }
-
-    /// Cost of one of its limbs at `poses` but for the points, nats.
-    pub(super) fn limb_cost(&self, at: Extremity, poses: &[Pose], limb: usize) -> f64 {
-        Objective::new(at.context, at.matched, 1.0, self.colors(at)).limb(poses, limb)
     }
 
     /// Sets the sample: unexplained points nearby, and the points that are matched to the arm or leg.
     pub(super) fn begin(&mut self, at: Extremity) {
-        self.draw_others(at);
         let Self { unexplained, sample, others, distances, .. } = self;
         sample.clear();
         sample.extend(unexplained);
-        for limb in at.chain().limbs() {
+        for limb in at.chain.limbs() {
             let matches = &at.matched.correspondences.limbs[limb];
             for (index, weight) in matches.weight.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
                 let point = matches.measured.get(index).to_array().map(|value| value as f32);
@@ -102,10 +77,9 @@ impl RoughScore {
             }
         }
         sample.subsample(ROUGH_SAMPLE);
-        others.clear();
-        others.resize(sample.len(), f32::INFINITY);
+        reset(others, sample.len(), f32::INFINITY);
         let (body, poses, bounds) = (&at.context.model.body, at.matched.poses, bounds(&sample.points));
-        for limb in (0..poses.len()).filter(|limb| at.chain().limbs().all(|own| own != *limb)) {
+        for limb in (0..poses.len()).filter(|limb| at.chain.limbs().all(|own| own != *limb)) {
             // Most limbs are too far away to explain any point.
             if may_explain(&body.limbs()[limb].shape, &poses[limb], bounds) {
                 explain(body, limb, poses, &sample.points, others, distances);
@@ -116,7 +90,7 @@ impl RoughScore {
     /// Rough cost of the arm or leg at `poses`, nats. The evaluation stops when the points alone cost `least`.
     pub(super) fn cost(&mut self, at: Extremity, poses: &[Pose], least: f64) -> f64 {
         let Self { sample, others, nearest, distances, .. } = self;
-        let (chain, body) = (at.chain(), &at.context.model.body);
+        let (chain, body) = (at.chain, &at.context.model.body);
         nearest.clone_from(others);
         chain.limbs().for_each(|limb| explain(body, limb, poses, &sample.points, nearest, distances));
         let points = rough_cost(nearest, &sample.weights);
@@ -124,16 +98,8 @@ impl RoughScore {
         if at.regions.is_none() && points >= least {
             return points;
         }
-        let objective = Objective::new(at.context, at.matched, 1.0, self.colors(at));
+        let objective = at.objective();
         points + chain.limbs().map(|limb| objective.limb(poses, limb)).sum::<f64>()
-    }
-}
-
-impl RoughSearch {
-    /// Reserves memory for a body of `limbs` limbs.
-    pub(super) fn prepare(&mut self, limbs: usize) {
-        self.trial.clear();
-        self.trial.reserve(limbs);
     }
 
     /// Finds the configuration of lowest cost that ends at `place`, among `swivels` bends about the line from the root to it. If
@@ -146,16 +112,10 @@ impl RoughSearch {
         mut least: f64,
         best: &mut Vec<Pose>,
     ) -> f64 {
-        let Self { score, trial } = self;
         for swivel in 0..swivels {
-            trial.clear();
-            trial.extend_from_slice(at.matched.poses);
-            at.chain().reach(&at.context.model.body, trial, place, TAU * swivel as f64 / swivels as f64);
-            let cost = score.cost(at, trial, least);
-            if cost < least {
-                least = cost;
-                best.clone_from(trial);
-            }
+            let angle = TAU * swivel as f64 / swivels as f64;
+            let reach = |poses: &mut [Pose]| at.chain.reach(&at.context.model.body, poses, place, angle);
+            least = self.changed(at, reach, least, best);
         }
         least
     }
@@ -169,16 +129,15 @@ impl RoughSearch {
         least: f64,
         best: &mut Vec<Pose>,
     ) -> f64 {
-        let Self { score, trial } = self;
-        trial.clear();
-        trial.extend_from_slice(at.matched.poses);
-        change(trial);
-        let cost = score.cost(at, trial, least);
+        let mut trial = std::mem::take(&mut self.trial);
+        refill(&mut trial, at.matched.poses.iter().copied());
+        change(&mut trial);
+        let cost = self.cost(at, &trial, least);
         if cost < least {
-            best.clone_from(trial);
-            return cost;
+            best.clone_from(&trial);
         }
-        least
+        self.trial = trial;
+        if cost < least { cost } else { least }
     }
 }
 
@@ -186,7 +145,6 @@ impl RoughSearch {
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
-    use crate::fit::Fit;
     use crate::hypotheses::unexplained::Unexplained;
     use crate::testing::{before_wall, first_arm, raised, standing, with_context, without_background};
 
@@ -194,8 +152,8 @@ mod tests {
     fn the_observed_bend_of_an_arm_has_the_lowest_cost() {
         let (model, poses) = standing();
         let (stretched, end) = raised(&model, &poses, 0.2);
-        let (config, index) = (without_background(), first_arm(&model));
-        let arm = &model.extremities[index];
+        let config = without_background();
+        let arm = &model.extremities[first_arm(&model)];
         let root = arm.root(&model.body, &stretched);
         let place = root + 0.6 * (end - root);
         for bend in [0, 2, 5] {
@@ -204,11 +162,11 @@ mod tests {
             with_context(&before_wall(&model.body, &raised_pose), &config, &model, &poses, |context| {
                 let mut fit = Fit::new(&config).unwrap();
                 fit.match_last(context, &poses);
-                let at = Extremity { context, matched: fit.matched(&poses), regions: None, index };
+                let at = Extremity::new(context, &fit, &poses, arm);
                 let (mut unexplained, mut rough) = (Unexplained::default(), RoughSearch::default());
                 unexplained.collect(context, at.matched);
-                unexplained.near(root, arm.stretched_length(), &mut rough.score.unexplained);
-                rough.score.begin(at);
+                unexplained.near(root, arm.stretched_length(), &mut rough.unexplained);
+                rough.begin(at);
                 let mut best = Vec::new();
                 rough.end_at(at, place, 6, f64::INFINITY, &mut best);
                 let elbow = best[arm.lower].translation.distance(raised_pose[arm.lower].translation);
@@ -225,18 +183,18 @@ mod tests {
         with_context(&pixels, &config, &model, &poses, |context| {
             let mut fit = Fit::new(&config).unwrap();
             fit.match_last(context, &poses);
-            let at = Extremity { context, matched: fit.matched(&poses), regions: None, index: first_arm(&model) };
+            let at = Extremity::new(context, &fit, &poses, &model.extremities[first_arm(&model)]);
             let mut unexplained = Unexplained::default();
             unexplained.collect(context, at.matched);
             let mut rough = RoughSearch::default();
-            unexplained.near(at.root(), at.chain().stretched_length(), &mut rough.score.unexplained);
-            rough.score.begin(at);
-            let hanging = rough.score.cost(at, &poses, f64::INFINITY);
-            let truth = rough.score.cost(at, &raised_pose, f64::INFINITY);
+            unexplained.near(at.root(), at.chain.stretched_length(), &mut rough.unexplained);
+            rough.begin(at);
+            let hanging = rough.cost(at, &poses, f64::INFINITY);
+            let truth = rough.cost(at, &raised_pose, f64::INFINITY);
             let mut best = Vec::new();
             let least = rough.end_at(at, end, 6, hanging, &mut best);
             assert!(truth < 0.3 * hanging && least < 0.5 * hanging, "{truth} and {least} of {hanging}");
-            assert!(at.chain().end(&best).distance(end) < 0.02, "the best configuration ends at the hand");
+            assert!(at.chain.end(&best).distance(end) < 0.02, "the best configuration ends at the hand");
             // Without a lower cost, the best configuration is unchanged.
             let before = best.clone();
             let mirrored = at.root() - (end - at.root());

@@ -1,7 +1,7 @@
 //! Candidates that no limb explains.
 
 use crate::fit::{Context, Matched};
-use crate::math::{Vec3, WeightedPoints};
+use crate::math::{Vec3, WeightedPoints, reset};
 use crate::visibility::EXPLAINED;
 
 /// Fraction of the points in a frame that a correct pose usually leaves unexplained, and the cost of a patch there, nats: the
@@ -28,8 +28,7 @@ impl Unexplained {
         points.clear();
         // Reserved now, so that later steps do not allocate.
         points.reserve(candidates.len());
-        nearest.clear();
-        nearest.resize(candidates.len(), f32::INFINITY);
+        reset(nearest, candidates.len(), f32::INFINITY);
         for matches in &matched.correspondences.limbs {
             for (candidate, distance) in matches.candidate.iter().zip(&matches.surface.signed_distance) {
                 let nearest = &mut nearest[*candidate as usize];

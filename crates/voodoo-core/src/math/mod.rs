@@ -33,6 +33,12 @@ pub fn reset<T: Clone>(values: &mut Vec<T>, len: usize, value: T) {
     values.resize(len, value);
 }
 
+/// Empties `values` and reserves memory for so many, so that later steps do not allocate.
+pub(crate) fn make_room<T>(values: &mut Vec<T>, len: usize) {
+    values.clear();
+    values.reserve(len);
+}
+
 /// Replaces `values` by others. Their memory is kept.
 #[inline(always)]
 pub fn refill<T>(values: &mut Vec<T>, others: impl IntoIterator<Item = T>) {

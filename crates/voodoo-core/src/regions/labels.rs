@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use crate::body::Body;
 use crate::camera::Camera;
-use crate::math::{Pose, Vec3, reset};
+use crate::math::{Pose, Vec3, make_room, reset};
 
 /// Corners of an end's silhouette: cosines and sines.
 const CORNERS: [[f64; 2]; 8] = {
@@ -74,20 +74,7 @@ impl LimbLabels {
         }
     }
 
-    /// Reserves memory for images of the given size.
-    pub(super) fn make_room(&mut self, bits: u32, width: usize, height: usize) {
-        let size = [width, height].map(|size| size.div_ceil(1 << bits));
-        self.clear(bits, size);
-        // What is left of the last limb would be reserved on top.
-        self.sides.clear();
-        self.sides.reserve(size[1]);
-        self.corners.clear();
-        self.corners.reserve(2 * CORNERS.len());
-        self.hull.clear();
-        self.hull.reserve(2 * CORNERS.len() + 1);
-    }
-
-    /// Clears what was drawn.
+    /// Clears what was drawn, and makes room for an image of this size.
     fn clear(&mut self, bits: u32, [columns, rows]: [usize; 2]) {
         if (self.bits, self.columns, self.rows) == (bits, columns, rows) {
             let [across, down] = self.drawn.clone();
@@ -100,6 +87,9 @@ impl LimbLabels {
             (self.bits, self.columns, self.rows) = (bits, columns, rows);
             reset(&mut self.limb, columns * rows, NOTHING);
             reset(&mut self.depth, columns * rows, f32::INFINITY);
+            make_room(&mut self.sides, rows);
+            make_room(&mut self.corners, 2 * CORNERS.len());
+            make_room(&mut self.hull, 2 * CORNERS.len() + 1);
         }
         self.drawn = [0..0, 0..0];
     }

@@ -28,7 +28,8 @@ use histogram::Kind;
 use labels::LimbLabels;
 use lines::{Line, OcclusionDepth, Viewer};
 use models::ColorModel;
-pub(crate) use pixel_gain::{Backdrop, PixelGain};
+pub(crate) use pixel_gain::PixelGain;
+use pixel_gain::{Backdrop, camera_from_limb_at};
 use scan::{EdgeSearch, ScanView};
 
 /// The edge search of each step of a frame: wide and coarse at first, then narrower and finer.
@@ -81,6 +82,7 @@ pub(crate) struct ColorRegions {
     /// Offset of the cameras that learn in the next frame.
     turn: usize,
     evidence: Vec<Evidence>,
+    /// The limbs that were drawn last, for what other limbs explain beside them.
     backdrop: Backdrop,
 }
 
@@ -294,7 +296,7 @@ impl ColorRegions {
 
     /// Places the lines of one image.
     fn place_lines(&mut self, frame: &Frame, picture: &ColorImage, posed: Posed) {
-        let camera_from_limb = self.camera_from_limb(frame, picture, posed);
+        let camera_from_limb = camera_from_limb_at(self.stamp, frame, picture, posed);
         let camera = self.camera(picture.number);
         refill(&mut camera.camera_from_limb, (0..posed.poses.len()).map(camera_from_limb));
         let [fx, fy] = picture.camera.focal();

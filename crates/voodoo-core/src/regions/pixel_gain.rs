@@ -34,43 +34,30 @@ pub(crate) struct PixelGain {
 
 /// Label images of selected limbs, one per camera.
 #[derive(Debug, Default)]
-pub(crate) struct Backdrop {
+pub(super) struct Backdrop {
     planes: Vec<LimbLabels>,
     camera_from_limb: Vec<Pose>,
     /// Whether each limb is drawn.
     drawn: Vec<bool>,
 }
 
-impl Backdrop {
-    /// Reserves memory for the images of a frame and the given number of limbs.
-    pub(crate) fn make_room(&mut self, frame: &Frame, limbs: usize) {
-        self.planes.resize_with(frame.colors.len(), LimbLabels::default);
-        for (labels, picture) in self.planes.iter_mut().zip(frame.colors) {
-            labels.make_room(BACKDROP_BITS, picture.camera.width(), picture.camera.height());
-        }
-        self.camera_from_limb.clear();
-        self.camera_from_limb.reserve(limbs);
-        self.drawn.clear();
-        self.drawn.reserve(limbs);
-    }
-}
-
 impl ColorRegions {
-    /// Draws the `visible` limbs into the backdrop of each camera.
-    pub(crate) fn draw(&self, frame: &Frame, posed: Posed, visible: impl Fn(usize) -> bool, backdrop: &mut Backdrop) {
-        let Backdrop { planes, camera_from_limb, drawn } = backdrop;
+    /// Draws the `visible` limbs into the backdrop of each camera, which shows only them afterwards.
+    pub(crate) fn draw(&mut self, frame: &Frame, posed: Posed, visible: impl Fn(usize) -> bool) {
+        let Backdrop { planes, camera_from_limb, drawn } = &mut self.backdrop;
         refill(drawn, (0..posed.poses.len()).map(&visible));
         planes.resize_with(frame.colors.len(), LimbLabels::default);
         for (picture, labels) in frame.colors.iter().zip(planes) {
-            refill(camera_from_limb, (0..posed.poses.len()).map(self.camera_from_limb(frame, picture, posed)));
+            let limb = camera_from_limb_at(self.stamp, frame, picture, posed);
+            refill(camera_from_limb, (0..posed.poses.len()).map(limb));
             labels.draw(posed.body, camera_from_limb, picture.camera, BACKDROP_BITS, &visible);
         }
     }
 
-    /// What a limb explains in addition to the limbs of the backdrop. Of a limb that is drawn there itself, only the pixels count
-    /// that show it, and nothing is known to be behind it.
-    pub(crate) fn pixel_gain(&self, frame: &Frame, posed: Posed, limb: usize, backdrop: &Backdrop) -> PixelGain {
-        let is_drawn = backdrop.drawn.get(limb).is_some_and(|drawn| *drawn);
+    /// What a limb explains in addition to the limbs that were drawn into the backdrop last. Of a limb that is drawn there itself,
+    /// only the pixels count that show it, and nothing is known to be behind it.
+    pub(crate) fn pixel_gain(&self, frame: &Frame, posed: Posed, limb: usize) -> PixelGain {
+        let is_drawn = self.backdrop.drawn.get(limb).is_some_and(|drawn| *drawn);
         // What would be visible at a cell without the limb, which has this depth there; `None` where the limb is occluded.
         let behind = |(label, behind): (u16, f32), depth: f64| {
             if is_drawn {
@@ -81,11 +68,11 @@ impl ColorRegions {
         let mut gain = PixelGain::default();
         let shape = &posed.body.limbs()[limb].shape;
         let group = usize::from(self.groups[limb]);
-        for (picture, labels) in frame.colors.iter().zip(&backdrop.planes) {
+        for (picture, labels) in frame.colors.iter().zip(&self.backdrop.planes) {
             let known = self.cameras.iter().find(|camera| camera.number == picture.number && camera.known);
             let Some(camera) = known.filter(|camera| camera.model.knows(group)) else { continue };
             let view = camera.view(picture, labels, &self.groups);
-            let camera_from_limb = self.camera_from_limb(frame, picture, posed)(limb);
+            let camera_from_limb = camera_from_limb_at(self.stamp, frame, picture, posed)(limb);
             places(shape, &camera_from_limb, picture.camera, |[u, v], depth, area| {
                 gain.area += area;
                 let [width, height] = [picture.camera.width(), picture.camera.height()];
@@ -113,34 +100,32 @@ impl ColorRegions {
         chains: &[TwoBone],
         supports: &mut [RegionSupport],
     ) {
-        let mut backdrop = std::mem::take(&mut self.backdrop);
         for chain in chains {
-            self.draw(frame, posed, |limb| chain.limbs().all(|own| own != limb), &mut backdrop);
+            self.draw(frame, posed, |limb| chain.limbs().all(|own| own != limb));
             for limb in chain.limbs() {
-                let gain = self.pixel_gain(frame, posed, limb, &backdrop);
+                let gain = self.pixel_gain(frame, posed, limb);
                 if let Some(support) = supports.get_mut(limb) {
                     (support.gained, support.area) = (gain.gained, gain.area);
                 }
             }
         }
-        self.backdrop = backdrop;
     }
+}
 
-    /// The limbs' poses in a camera's frame at the time of its image.
-    pub(super) fn camera_from_limb<'a>(
-        &self,
-        frame: &Frame,
-        picture: &ColorImage,
-        Posed { poses, previous, origin, .. }: Posed<'a>,
-    ) -> impl Fn(usize) -> Pose + use<'a> {
-        // Time from the frame to the image, as a fraction of the interval of the last motion.
-        let passed = self.stamp.map_or(f64::INFINITY, |stamp| frame.stamp - stamp);
-        let fraction = (picture.stamp - frame.stamp) / passed;
-        let camera_from_working = shifted(&picture.world_from_sensor, origin).inverse();
-        move |limb| {
-            let (now, before) = (&poses[limb], previous.get(limb).filter(|_| fraction != 0.0));
-            camera_from_working * before.map_or(*now, |before| extrapolated(before, now, fraction))
-        }
+/// The limbs' poses in a camera's frame at the time of its image; `last` is the time of the last frame.
+pub(super) fn camera_from_limb_at<'a>(
+    last: Option<f64>,
+    frame: &Frame,
+    picture: &ColorImage,
+    Posed { poses, previous, origin, .. }: Posed<'a>,
+) -> impl Fn(usize) -> Pose + use<'a> {
+    // Time from the frame to the image, as a fraction of the interval of the last motion.
+    let passed = last.map_or(f64::INFINITY, |last| frame.stamp - last);
+    let fraction = (picture.stamp - frame.stamp) / passed;
+    let camera_from_working = shifted(&picture.world_from_sensor, origin).inverse();
+    move |limb| {
+        let (now, before) = (&poses[limb], previous.get(limb).filter(|_| fraction != 0.0));
+        camera_from_working * before.map_or(*now, |before| extrapolated(before, now, fraction))
     }
 }
 

@@ -5,7 +5,7 @@ use crate::association::correspondence::RegionPair;
 use crate::body::Body;
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::Frame;
-use crate::regions::{Backdrop, ColorRegions, PixelGain, Posed};
+use crate::regions::{ColorRegions, PixelGain, Posed};
 use crate::terms::normal_equations::{NormalEquations, line};
 
 /// All edges.
@@ -17,10 +17,10 @@ pub(crate) struct Regions<'a> {
     pub colors: Option<Colors<'a>>,
 }
 
-/// The color images of a frame, and the limbs drawn in them.
+/// The color images of a frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Colors<'a> {
-    /// What is known of the colors.
+    /// What is known of the colors, and the limbs drawn last: the whole body, or those that are not compared.
     pub regions: &'a ColorRegions,
     /// The frame.
     pub frame: &'a Frame<'a>,
@@ -28,15 +28,13 @@ pub(crate) struct Colors<'a> {
     pub previous: &'a [Pose],
     /// The working frame's origin in the world.
     pub origin: Vec3,
-    /// Label images: of the whole body, or of the limbs that are not compared.
-    pub backdrop: &'a Backdrop,
 }
 
 impl Colors<'_> {
     /// What a limb explains of the images.
     pub(crate) fn pixel_gain(&self, body: &Body, poses: &[Pose], limb: usize) -> PixelGain {
-        let Self { regions, frame, previous, origin, backdrop } = *self;
-        regions.pixel_gain(frame, Posed { body, poses, previous, origin }, limb, backdrop)
+        let Self { regions, frame, previous, origin } = *self;
+        regions.pixel_gain(frame, Posed { body, poses, previous, origin }, limb)
     }
 }
 

@@ -61,7 +61,7 @@ impl BodyTracker {
         let Self { model, motion, fit, hypotheses, relocalizer, sizes, assessor, estimate, .. } = self;
         // The motion restarts because the previous poses belong to another body.
         motion.forget();
-        hypotheses.restart(model);
+        hypotheses.restart();
         relocalizer.bind(&model.body);
         if motion.poses.is_empty() {
             return;

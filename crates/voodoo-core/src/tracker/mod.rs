@@ -127,7 +127,7 @@ impl BodyTracker {
         self.motion.restart(world_from_limb);
         self.observer.clear();
         self.fit.clear();
-        self.hypotheses.restart(&self.model);
+        self.hypotheses.restart();
         self.relocalizer.restart(&self.model, &self.motion.poses);
         let start = if fit_sizes { Start::Positions } else { Start::SizesKnown };
         self.sizes.restart(&self.model, start, &self.config);

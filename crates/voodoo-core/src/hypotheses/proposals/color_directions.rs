@@ -5,12 +5,12 @@ use std::f64::consts::{PI, TAU};
 
 use super::{Pool, Propose, SWIVELS};
 use crate::hypotheses::rough::{Extremity, RoughSearch};
-use crate::math::{Pose, Vec3};
+use crate::math::{Pose, Vec3, make_room, refill};
 
 /// Search over directions, with working memory.
 #[derive(Debug, Default)]
 pub(in crate::hypotheses) struct ColorDirections {
-    trial: Vec<Pose>,
+    pub(in crate::hypotheses) trial: Vec<Pose>,
     /// The best directions of the upper limb, working frame, and their costs in ascending order.
     kept: Vec<(f64, Vec3)>,
 }
@@ -20,41 +20,28 @@ impl Propose for ColorDirections {
         if at.regions.is_none() {
             return;
         }
-        self.find_directions(at, rough);
+        self.find_directions(at);
         let body = &at.context.model.body;
         for &(_, upper) in &self.kept {
-            let bend = at.root() + at.chain().lengths[0] * upper;
+            let bend = at.root() + at.chain.lengths[0] * upper;
             for lower in directions() {
-                let change = |poses: &mut [Pose]| at.chain().place_between(body, poses, bend, bend + lower);
-                let least = rough.changed(at, change, pool.least, &mut pool.points.poses);
-                if least < pool.least {
-                    pool.least = least;
-                    pool.points.found = true;
-                }
+                let change = |poses: &mut [Pose]| at.chain.place_between(body, poses, bend, bend + lower);
+                pool.least = rough.changed(at, change, pool.least, &mut pool.points);
             }
         }
     }
 }
 
 impl ColorDirections {
-    /// Reserves memory for a body of `limbs` limbs.
-    pub(in crate::hypotheses) fn make_room(&mut self, limbs: usize) {
-        self.trial.clear();
-        self.trial.reserve(limbs);
-        self.kept.clear();
-        self.kept.reserve(SWIVELS);
-    }
-
     /// Finds the directions of the upper limb of lowest cost. The current direction is one of the candidates.
-    fn find_directions(&mut self, at: Extremity, rough: &RoughSearch) {
+    fn find_directions(&mut self, at: Extremity) {
         let Self { trial, kept } = self;
-        let (chain, body, poses) = (at.chain(), &at.context.model.body, at.matched.poses);
-        kept.clear();
+        let (chain, body, poses) = (at.chain, &at.context.model.body, at.matched.poses);
+        make_room(kept, SWIVELS);
         for upper in directions().chain([poses[chain.upper].rotation * Vec3::Z]) {
-            trial.clear();
-            trial.extend_from_slice(poses);
+            refill(trial, poses.iter().copied());
             chain.place_between(body, trial, at.root() + upper, at.root() + 2.0 * upper);
-            let cost = rough.score.limb_cost(at, trial, chain.upper);
+            let cost = at.objective().limb(trial, chain.upper);
             let place = kept.partition_point(|(other, _)| *other <= cost);
             if place < SWIVELS {
                 kept.truncate(SWIVELS - 1);

@@ -13,7 +13,7 @@ impl DetectedEnd<'_> {
     /// Detected position of the chain's end, world frame: a joint detected on its last limb, or the detected wrist or ankle plus
     /// the current offset of the end from it.
     fn end(&self, at: Extremity) -> Option<Vec3> {
-        let (chain, body, poses) = (at.chain(), &at.context.model.body, at.matched.poses);
+        let (chain, body, poses) = (at.chain, &at.context.model.body, at.matched.poses);
         let detected = self.0?;
         let last = chain.ends.first()?;
         let joint = body.limbs()[*last].parent.as_ref().map(|(_, joint)| joint)?;
@@ -30,7 +30,6 @@ impl Propose for DetectedEnd<'_> {
         let Some(end) = self.end(at) else { return };
         let place = end - at.context.observation.origin();
         // The bend is searched for, because a detected elbow or knee is no more accurate than the wrist or ankle.
-        let cost = rough.end_at(at, place, 2 * SWIVELS, f64::INFINITY, &mut pool.detected.poses);
-        pool.detected.found = cost < f64::INFINITY;
+        rough.end_at(at, place, 2 * SWIVELS, f64::INFINITY, &mut pool.detected);
     }
 }

@@ -23,50 +23,28 @@ pub(super) trait Propose {
     fn propose(&mut self, at: Extremity, rough: &mut RoughSearch, pool: &mut Pool);
 }
 
-/// A configuration of the whole body that may be refined.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Proposal {
-    pub(super) found: bool,
-    pub(super) poses: Vec<Pose>,
-}
-
-/// Proposals for one arm or leg: one slot for each kind, in the order in which they are refined.
+/// Proposals for one arm or leg, one of each kind in the order in which they are refined: the poses of the whole body, or none.
 #[derive(Debug, Default)]
 pub(super) struct Pool {
     /// The configuration of lowest rough cost, and that cost; initially the highest that is worth refining.
-    pub(super) points: Proposal,
+    pub(super) points: Vec<Pose>,
     pub(super) least: f64,
     /// It is stretched through unexplained points.
-    pub(super) stretched: Proposal,
+    pub(super) stretched: Vec<Pose>,
     /// The end is at its detected position.
-    pub(super) detected: Proposal,
+    pub(super) detected: Vec<Pose>,
 }
 
 impl Pool {
-    /// Reserves memory for a body of `limbs` limbs.
-    pub(super) fn prepare(&mut self, limbs: usize) {
-        for proposal in self.slots() {
-            proposal.poses.clear();
-            proposal.poses.reserve(limbs);
-        }
-    }
-
-    /// Clears all slots. The current configuration costs `current`.
+    /// Removes all proposals. The current configuration costs `current`.
     pub(super) fn begin(&mut self, current: f64) {
-        for proposal in self.slots() {
-            proposal.found = false;
-        }
+        let Self { points, stretched, detected, .. } = self;
+        [points, stretched, detected].into_iter().for_each(Vec::clear);
         self.least = current - MARGIN;
     }
 
-    /// The proposals found, in the order in which they are refined.
-    pub(super) fn found(&self) -> impl Iterator<Item = &Proposal> {
-        let Self { points, stretched, detected, .. } = self;
-        [points, stretched, detected].into_iter().filter(|slot| slot.found)
-    }
-
-    fn slots(&mut self) -> [&mut Proposal; 3] {
-        let Self { points, stretched, detected, .. } = self;
-        [points, stretched, detected]
+    /// The proposals, in the order in which they are refined.
+    pub(super) fn found(&self) -> impl Iterator<Item = &Vec<Pose>> {
+        [&self.points, &self.stretched, &self.detected].into_iter().filter(|poses| !poses.is_empty())
     }
 }

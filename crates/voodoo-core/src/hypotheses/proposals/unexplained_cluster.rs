@@ -2,41 +2,25 @@
 
 use super::{Pool, Propose, SWIVELS};
 use crate::hypotheses::rough::{Extremity, RoughSearch};
-use crate::math::{Vec3, WeightedPoints};
+use crate::math::{Vec3, WeightedPoints, refill};
 use crate::terms::APART;
 use crate::visibility::FEW;
 
 /// Proposal of ends at the clusters that are farthest from the root and from each other.
 #[derive(Debug, Default)]
 pub(in crate::hypotheses) struct UnexplainedCluster {
-    apart: Vec<f32>,
-}
-
-impl UnexplainedCluster {
-    /// Reserves memory for a frame of `count` candidates.
-    pub(in crate::hypotheses) fn make_room(&mut self, count: usize) {
-        self.apart.clear();
-        self.apart.reserve(count);
-    }
+    pub(in crate::hypotheses) apart: Vec<f32>,
 }
 
 impl Propose for UnexplainedCluster {
     fn propose(&mut self, at: Extremity, rough: &mut RoughSearch, pool: &mut Pool) {
-        let ends = end_proposals(&rough.score.unexplained, at.root(), &mut self.apart);
+        let ends = end_proposals(&rough.unexplained, at.root(), &mut self.apart);
         let mut stretched = pool.least;
         for end in ends.into_iter().flatten() {
             // A hand that lies on another limb leaves only the points of its forearm, which a stretched arm passes.
-            let beyond = at.root() + (end - at.root()).normalize() * at.chain().stretched_length();
-            let cost = rough.end_at(at, beyond, 1, stretched, &mut pool.stretched.poses);
-            if cost < stretched {
-                stretched = cost;
-                pool.stretched.found = true;
-            }
-            let least = rough.end_at(at, end, SWIVELS, pool.least, &mut pool.points.poses);
-            if least < pool.least {
-                pool.least = least;
-                pool.points.found = true;
-            }
+            let beyond = at.root() + (end - at.root()).normalize() * at.chain.stretched_length();
+            stretched = rough.end_at(at, beyond, 1, stretched, &mut pool.stretched);
+            pool.least = rough.end_at(at, end, SWIVELS, pool.least, &mut pool.points);
         }
     }
 }
@@ -44,8 +28,7 @@ impl Propose for UnexplainedCluster {
 /// Positions for the end: centroids of clusters, selected by farthest-point sampling from the root. `apart` is working memory.
 fn end_proposals(cluster: &WeightedPoints, root: Vec3, apart: &mut Vec<f32>) -> [Option<Vec3>; SWIVELS] {
     let WeightedPoints { points, weights } = cluster;
-    apart.clear();
-    apart.extend((0..points.len()).map(|index| (points.get(index) - root).length() as f32));
+    refill(apart, (0..points.len()).map(|index| (points.get(index) - root).length() as f32));
     let (mut ends, mut found) = ([None; SWIVELS], 0);
     while found < SWIVELS {
         let Some(next) = (0..points.len()).max_by(|a, b| apart[*a].total_cmp(&apart[*b])) else { break };
