@@ -19,7 +19,7 @@ use crate::detect::{Detected, DetectedLimbs, MeasuredJoint};
 use crate::error::TrackError;
 use crate::math::{Pose, Vec3, refill};
 use crate::regions;
-use crate::solver::{Gate, Problem, Schedule, Solver, solver};
+use crate::solver::{Gate, Problem, Solver, solver};
 use crate::threads::Threads;
 
 /// First step of a frame that uses the depth contour: in earlier steps, it would push thin limbs off their points (method section
@@ -82,11 +82,6 @@ impl Fit {
         self.detected_limbs.clear();
     }
 
-    /// Returns the solver's schedule for the loop.
-    pub(crate) fn schedule(&self, config: &Config) -> Schedule {
-        self.solver.schedule(config)
-    }
-
     /// Returns the last correspondences.
     pub(crate) fn correspondences(&self) -> &Correspondences {
         &self.correspondences
@@ -117,11 +112,11 @@ impl Fit {
     /// Returns the number of steps.
     pub(crate) fn run(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose]) -> usize {
         self.warm_start(context, poses);
-        let schedule = self.schedule(context.config);
+        let kind = context.config.solver;
         let mut steps = 0;
         let mut before = f64::INFINITY;
         while steps < context.config.max_steps {
-            if schedule.reassociates(steps) {
+            if kind.reassociates(steps) {
                 self.match_all(context, poses, steps);
             } else {
                 self.match_again(context, poses, steps);
@@ -130,14 +125,14 @@ impl Fit {
             self.solve(context, predicted, poses, steps);
             steps += 1;
             // Whole-body solvers always take all steps: a step more or less would be a jump of the result.
-            let settled = !schedule.whole_body && (before - distance).abs() < context.config.min_change;
+            let settled = !kind.is_whole_body() && (before - distance).abs() < context.config.min_change;
             if settled || steps >= regions::STEPS && context.compares_colors() {
                 break;
             }
             before = distance;
         }
         // The last steps hardly moved anything, so points stay assigned to their limbs where they are assigned.
-        self.match_end(context, poses, steps == 0 || !schedule.whole_body);
+        self.match_end(context, poses, steps == 0 || !kind.is_whole_body());
         steps
     }
 
@@ -149,7 +144,7 @@ impl Fit {
 
     /// Steps 2 to 5 at `poses`: turns all measurements into correspondences.
     pub(crate) fn match_all(&mut self, context: Context, poses: &[Pose], step: usize) {
-        let gate = self.schedule(context.config).gate(step);
+        let gate = Gate::new(context.config, step);
         // 2 Assign points to limbs.
         self.assign(context, poses, &gate);
         if step >= CONTOUR_FROM {
@@ -168,7 +163,7 @@ impl Fit {
 
     /// Like `match_last`; `anew` states whether points are assigned to limbs anew.
     fn match_end(&mut self, context: Context, poses: &[Pose], anew: bool) {
-        let gate = self.schedule(context.config).gate(context.config.max_steps);
+        let gate = Gate::new(context.config, context.config.max_steps);
         if anew {
             self.assign(context, poses, &gate);
         }
@@ -215,7 +210,7 @@ impl Fit {
     fn warm_start(&mut self, context: Context, poses: &mut [Pose]) {
         let frame = context.observation.frame();
         let named = !frame.positions.is_empty() || !frame.rays.is_empty();
-        let points = !self.schedule(context.config).whole_body;
+        let points = !context.config.solver.is_whole_body();
         let mut round = 0;
         loop {
             if named && points {
@@ -233,14 +228,14 @@ impl Fit {
 
     /// Steps 3 to 5 with unchanged assignments of points to limbs and of contours to edges.
     pub(crate) fn match_again(&mut self, context: Context, poses: &[Pose], step: usize) {
-        let gate = self.schedule(context.config).gate(step);
+        let gate = Gate::new(context.config, step);
         self.match_assigned(context, poses, &gate, false);
         self.find_regions(context, poses, step);
     }
 
     fn match_assigned(&mut self, context: Context, poses: &[Pose], gate: &Gate, anew: bool) {
         // 3 Reduce the number of points, 4 find closest points.
-        self.match_surface(context, poses, gate, anew, self.schedule(context.config).visible_side);
+        self.match_surface(context, poses, gate, anew, context.config.facing && context.config.solver.is_whole_body());
         // 4 Point-to-point relations, 5 closest points on rays.
         self.match_sites(context, poses);
         self.contours.pairs(poses, &mut self.correspondences.contour);
@@ -255,7 +250,7 @@ impl Fit {
     fn assign(&mut self, context: Context, poses: &[Pose], gate: &Gate) {
         let Context { config, model, observation, .. } = context;
         // The published solver uses points anywhere on its limbs.
-        let buried = if self.schedule(config).whole_body { self.buried.find(&model.body, poses) } else { &[] };
+        let buried = if config.solver.is_whole_body() { self.buried.find(&model.body, poses) } else { &[] };
         self.assignment.assign(&model.body, poses, observation.candidates, config.overlap, gate.box_margin, buried);
     }
 
@@ -269,9 +264,8 @@ impl Fit {
     /// call.
     fn match_surface(&mut self, context: Context, poses: &[Pose], gate: &Gate, anew: bool, visible_side: bool) {
         let Context { config, model, observation, .. } = context;
-        let Self { solver, assignment, correspondences, threads, detected_limbs, radius_variances, .. } = self;
+        let Self { assignment, correspondences, threads, detected_limbs, radius_variances, .. } = self;
         let (assignment, limbs, candidates) = (&*assignment, model.body.limbs(), observation.candidates);
-        let whole_body = solver.schedule(config).whole_body;
         correspondences.limbs.resize_with(poses.len(), LimbMatches::default);
         let work = |(index, matches): (usize, &mut LimbMatches)| {
             if anew {
@@ -279,7 +273,7 @@ impl Fit {
                 detected_limbs.weigh(index, limbs[index].shape.max_radius(), &matches.measured, &mut matches.own);
             }
             matches.radius_variance = radius_variances.get(index).copied().unwrap_or_default();
-            match_limb(&limbs[index], &poses[index], gate.distance, whole_body, matches);
+            match_limb(&limbs[index], &poses[index], gate.distance, config.solver.is_whole_body(), matches);
             if visible_side {
                 match_visible_side(&limbs[index].shape, &poses[index], candidates, gate.distance, matches);
             }
@@ -289,10 +283,9 @@ impl Fit {
 
     /// Steps 6 and 7: fits the body to the correspondences.
     pub(crate) fn solve(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose], step: usize) {
-        let bands = !self.schedule(context.config).whole_body;
         let Self { solver, correspondences, band_weights, .. } = self;
         // 6 Elastic bands on both limbs.
-        if bands {
+        if !context.config.solver.is_whole_body() {
             correspondences.add_bands(&context.model.body, poses, context.config.band_ratio, band_weights);
         }
         // 7 Fit the model.

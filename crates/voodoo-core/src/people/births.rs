@@ -5,7 +5,6 @@ use super::person::Person;
 use super::tentative_tracks::{SAME_PERSON, TentativeTrack};
 use super::{ONE_BODY, People, Refusal, assign};
 use crate::body::{Body, Model};
-use crate::config::SolverKind;
 use crate::detect::{Detected, DetectionQuery, PlacedDetection, Surroundings, fit_body};
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::{DepthImage, Frame, PositionRelation};
@@ -107,7 +106,7 @@ impl People {
     /// Whether a detection may be of somebody new or lost, and not of a person whose given start nothing confirmed yet.
     fn finds_new(&self, stamp: f64) -> bool {
         let unconfirmed = |person: &Person| person.is_tracked() && !person.tracker.is_confirmed(stamp);
-        let relocalizes = self.config.relocalization && self.config.solver != SolverKind::Limbwise;
+        let relocalizes = self.config.relocalization && self.config.solver.is_whole_body();
         (relocalizes || !self.persons.iter().any(|person| person.present)) && !self.persons.iter().any(unconfirmed)
     }
 

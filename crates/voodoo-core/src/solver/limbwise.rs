@@ -1,8 +1,7 @@
 //! The published solver: weighted absolute orientation of each limb separately (K06 IV-B.7, K07 3.2).
 
-use super::{Gate, Problem, Schedule, Solver, WarmStart};
+use super::{Problem, Solver, WarmStart};
 use crate::association::correspondence::LimbMatches;
-use crate::config::Config;
 use crate::math::{Mat3, Moments, Pose, Vec3};
 
 /// Lever of the damping against rotation where the pairs do not determine it, meters: the girth of a limb.
@@ -50,11 +49,6 @@ impl Solver for Limbwise {
         }
         self.warm_start.step(problem, poses);
         problem.step + 1 < LIMBWISE_ROUNDS
-    }
-
-    fn schedule(&self, config: &Config) -> Schedule {
-        let gate = Gate { box_margin: config.limb_box_margin, distance: config.max_distance };
-        Schedule { gates: [gate; 2], visible_side: false, whole_body: false }
     }
 }
 

@@ -12,7 +12,7 @@ mod whole_body;
 pub(crate) use chain::ChainSolver;
 pub(crate) use lengths::Lengths;
 pub(crate) use limbwise::Limbwise;
-pub(crate) use schedule::{Gate, Schedule};
+pub(crate) use schedule::Gate;
 pub(crate) use spread::Spread;
 pub(crate) use tree::TreeSolver;
 pub(crate) use warm_start::WarmStart;
@@ -57,14 +57,9 @@ pub(crate) struct Problem<'a> {
 
 /// Moves the limbs towards their correspondences: prepares a frame, then solves every step of it.
 pub(crate) trait Solver: std::fmt::Debug + Send + Sync {
-    /// The schedule that the solver needs.
-    fn schedule(&self, config: &Config) -> Schedule;
-
     /// Warm start: follows the named sites before the first step of a frame. Returns true to request another round.
     /// `problem.predicted` are the poses before the frame.
-    fn prepare(&mut self, _problem: &Problem, _poses: &mut [Pose]) -> bool {
-        false
-    }
+    fn prepare(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool;
 
     /// One update of all poses (working frame).
     fn solve(&mut self, problem: &Problem, poses: &mut [Pose]);

@@ -2,9 +2,8 @@
 
 use super::lengths::Lengths;
 use super::schedule::narrowed;
-use super::{ChainSolver, Gate, LIMIT_SIGMA, Problem, Schedule, Solver, TreeSolver, WarmStart};
+use super::{ChainSolver, LIMIT_SIGMA, Problem, Solver, TreeSolver, WarmStart};
 use crate::body::{JointKind, Pair};
-use crate::config::Config;
 use crate::math::{Pose, Quat, Vec3, refill, reset};
 use crate::terms::normal_equations::NormalEquations;
 use crate::terms::{DetectedJoints, Floor, Limits, Measurements, Penetration, Posture, Prior, Rest, Term};
@@ -94,15 +93,6 @@ impl Solver for WholeBody {
         }
         self.warm_start.step(problem, poses);
         problem.step + 1 < WARM_START_ROUNDS
-    }
-
-    fn schedule(&self, config: &Config) -> Schedule {
-        let gate = |distance: f64| Gate { box_margin: distance, distance };
-        Schedule {
-            gates: [gate(config.gate_start), gate(config.gate_end)],
-            visible_side: config.facing,
-            whole_body: true,
-        }
     }
 }
 

@@ -233,8 +233,8 @@ impl BodyTracker {
     /// Runs the detector where it is due, and moves the body where it is elsewhere: to its detection, or, where a lost body cannot
     /// be detected, to a segment.
     fn relocate(&mut self, frame: &Frame, ownership: OwnershipMask) {
-        let Self { config, model, motion, fit, hypotheses, relocalizer, sizes, assessor, .. } = self;
-        if !fit.schedule(config).whole_body {
+        let Self { config, model, motion, hypotheses, relocalizer, sizes, assessor, .. } = self;
+        if !config.solver.is_whole_body() {
             return;
         }
         let interrupted = motion.stamp.is_some_and(|last| frame.stamp - last > INTERRUPTION);
@@ -287,10 +287,9 @@ impl BodyTracker {
     fn track(&mut self, frame: &Frame, ownership: OwnershipMask) {
         let Self { config, model, motion, observer, fit, hypotheses, relocalizer, sizes, assessor, moved_to, .. } =
             self;
-        let schedule = fit.schedule(config);
-        let known = motion.stamp.is_some();
+        let (known, whole_body) = (motion.stamp.is_some(), config.solver.is_whole_body());
         // Predicted pose, and candidates around it (step 1 of K06 IV-B).
-        let time_scale = motion.advance(&model.body, frame.stamp, config.prediction, schedule.whole_body);
+        let time_scale = motion.advance(&model.body, frame.stamp, config.prediction, whole_body);
         let Motion { poses, previous, predicted, origin, .. } = motion;
         observer.begin(frame, ownership);
         if let Some((image, pixels)) = moved_to {
@@ -307,7 +306,7 @@ impl BodyTracker {
         // Sizes from the first frame, then warm start and ICP steps (steps 2 to 7).
         let mut steps = 0;
         fit.begin_regions(setting.with_model(model), poses);
-        if config.hypotheses && schedule.whole_body && known {
+        if config.hypotheses && whole_body && known {
             steps += hypotheses.follow_branch(setting.with_model(model), fit);
         }
         if sizes.wait_for_pose() {
@@ -316,12 +315,12 @@ impl BodyTracker {
         sizes.initialize(setting, model, poses, fit);
         steps += fit.run(setting.with_model(model), predicted, poses);
         // Alternative hypotheses for arms and legs.
-        if config.hypotheses && schedule.whole_body && known && assessor.status() != Status::Lost {
+        if config.hypotheses && whole_body && known && assessor.status() != Status::Lost {
             steps += hypotheses.improve(setting.with_model(model), fit, poses, predicted, relocalizer.detected());
         }
         // Refinement of the sizes with this frame.
         let lost = assessor.status() == Status::Lost;
-        let reliance = Reliance { lost, girths: schedule.whole_body, limb: |limb| assessor.is_reliable(limb) };
+        let reliance = Reliance { lost, girths: whole_body, limb: |limb| assessor.is_reliable(limb) };
         sizes.refine(setting, model, poses, predicted, fit, reliance);
         // Assessment: status of the body and its limbs.
         assessor.assess(setting.with_model(model), fit.matched(poses), relocalizer.detected());
