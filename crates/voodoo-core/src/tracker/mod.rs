@@ -13,16 +13,16 @@ use crate::detect::{Detect, DetectError, Detected, PlacedDetection};
 use crate::error::TrackError;
 use crate::fit::{Fit, Motion, Setting};
 use crate::hypotheses::Hypotheses;
-use crate::math::{Pose, Vec3, is_rigid, shifted};
+use crate::math::{Pose, Vec3, is_rigid, refill, shifted};
 use crate::observation::candidates::body_box;
 use crate::observation::frame::Frame;
 use crate::observation::observer::{Observer, Own};
 use crate::observation::ownership::OwnershipMask;
 use crate::relocalize::{DetectionVerdict, FrameOutcome, Reasons, Relocalizer, trunk_is_elsewhere};
 use crate::sizes::{Reliance, Sizes, Start};
-use crate::uncertainty::FittedPose;
+use crate::uncertainty::{FittedPose, Uncertainty};
 use assess::Assessor;
-use estimate::{Estimate, Status};
+use estimate::{Estimate, LimbStatus, Status};
 use expected::Before;
 
 /// After this time without a frame the body may be anywhere, in any pose, seconds.
@@ -57,6 +57,7 @@ pub struct BodyTracker {
     relocalizer: Relocalizer,
     sizes: Sizes,
     assessor: Assessor,
+    uncertainty: Uncertainty,
     estimate: Estimate,
     before: Before,
     /// Index of the image and pixels of the detection to which the body was moved in this frame.
@@ -75,6 +76,7 @@ impl BodyTracker {
             relocalizer: Relocalizer::default(),
             sizes: Sizes::default(),
             assessor: Assessor::default(),
+            uncertainty: Uncertainty::default(),
             estimate: Estimate::default(),
             before: Before::default(),
             moved_to: None,
@@ -186,7 +188,7 @@ impl BodyTracker {
         let Some((body, poses)) = self.relocalizer.fit_detected(&self.model, set) else { return false };
         self.restart(body, poses, !known);
         self.before.keep(&self.estimate);
-        self.assessor.distrust_pose();
+        self.assessor.moved();
         self.relocalizer.record_start(true);
         if !known {
             self.sizes.restart(&self.model, Start::Detected, &self.config);
@@ -428,12 +430,15 @@ impl BodyTracker {
 
     /// Fills the estimate: for a frame `time_scale` after the last one, or, with `None`, for a pose that was set.
     fn report(&mut self, stamp: f64, steps: usize, time_scale: Option<f64>) {
-        let Self { config, model, motion, observer, fit, hypotheses, sizes, assessor, estimate, .. } = self;
+        let Self { config, model, motion, observer, fit, hypotheses, sizes, assessor, uncertainty, estimate, .. } =
+            self;
         estimate.fill(&model.body, motion, fit.correspondences(), observer.candidates());
         (estimate.stamp, estimate.steps) = (stamp, steps);
         let Some(time_scale) = time_scale else {
             assessor.report_status(model, estimate);
-            assessor.forget_spread(&model.body, estimate);
+            assessor.forget_edges();
+            uncertainty.forget();
+            estimate.covariances.forget(&model.body);
             return;
         };
         let (body, poses, correspondences) = (&model.body, &motion.poses, fit.correspondences());
@@ -443,7 +448,9 @@ impl BodyTracker {
         let branch_distance = |limb: usize| hypotheses.branch_distance(body, limb, &shifted(&poses[limb], -origin));
         assessor.follow_edges(model, found, branch_distance);
         assessor.report_status(model, estimate);
-        assessor.report_spread(found, |limb| sizes.girth_sigma(body, limb), estimate);
+        let Estimate { limb_status, covariances, .. } = estimate;
+        uncertainty.estimate(found, |limb| limb_status[limb] == LimbStatus::Measured, covariances);
+        refill(&mut covariances.girths, (0..poses.len()).map(|limb| sizes.girth_sigma(body, limb)));
     }
 }
 

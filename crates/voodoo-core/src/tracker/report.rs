@@ -4,6 +4,7 @@ use super::estimate::{Estimate, SourceReport};
 use crate::association::correspondence::Correspondences;
 use crate::body::Body;
 use crate::fit::Motion;
+use crate::math::refill;
 use crate::observation::candidates::Candidates;
 
 impl Estimate {
@@ -18,10 +19,11 @@ impl Estimate {
         let (estimate, poses) = (self, &motion.poses);
         let measured = correspondences.mean_squared_distance().or_else(|| correspondences.mean_squared_edge());
         estimate.mean_squared_distance = measured.unwrap_or(f64::NAN);
-        estimate.world_from_limb.clear();
-        estimate.world_from_limb.extend(motion.world_from_limb());
-        estimate.sites.clear();
-        estimate.sites.extend((0..body.sites().len()).map(|site| body.site_position(&estimate.world_from_limb, site)));
+        refill(&mut estimate.world_from_limb, motion.world_from_limb());
+        refill(
+            &mut estimate.sites,
+            (0..body.sites().len()).map(|site| body.site_position(&estimate.world_from_limb, site)),
+        );
         estimate.limb_points.clear();
         estimate.limb_residual.clear();
         estimate.joint_gaps.clear();

@@ -19,17 +19,13 @@ pub(super) fn detection_log_odds(
         let (parent, joint) = body.limbs()[limb].parent.as_ref()?;
         let detected = detected.hangs_by(limb)?;
         let tracked = poses[*parent] * joint.parent_from_joint.translation + origin;
-        Some(joint_log_odds(tracked - detected.position, detected.sigma))
+        // For a right joint the expected square along an axis is the variance. The tracked position has the tolerance `EXPLAINED`,
+        // the distance within which a limb explains a point.
+        let variance = detected.sigma * detected.sigma + EXPLAINED * EXPLAINED;
+        let apart = (tracked - detected.position).to_array();
+        Some(apart.iter().map(|along| 0.5 * (1.0 - along * along / variance)).sum::<f64>())
     };
     limbs.into_iter().flatten().filter_map(apart).sum()
-}
-
-/// Returns the log odds that a joint is right which lies `apart` from its detected position, meters; `sigma` is the detection's
-/// standard deviation along each axis. For a right joint the expected square along an axis is the variance. The tracked position
-/// has the tolerance `EXPLAINED`, the distance within which a limb explains a point.
-fn joint_log_odds(apart: Vec3, sigma: f64) -> f64 {
-    let variance = sigma * sigma + EXPLAINED * EXPLAINED;
-    apart.to_array().iter().map(|along| 0.5 * (1.0 - along * along / variance)).sum()
 }
 
 #[cfg(test)]

@@ -7,12 +7,6 @@ use crate::body::Model;
 use crate::uncertainty::FittedPose;
 use crate::visibility::EXPLAINED;
 
-/// Factor on a limb's standard deviation when the second branch puts its end at a distance of `apart` meters. It is 1 where the
-/// branches differ by as much as a point may lie from the limb that explains it.
-fn sigma_factor(apart: f64) -> f64 {
-    (apart / EXPLAINED).sqrt()
-}
-
 impl Assessor {
     /// Updates the uncertainty of each limb with a frame's color edges. `branch_distance` gives the distance of a limb's distal
     /// end to that in the second branch, if there is one.
@@ -36,7 +30,10 @@ impl Assessor {
             for limb in [chain.upper, chain.lower] {
                 let support = correspondences.region_support.get(limb).copied();
                 let RegionSupport { own, visible, .. } = support.unwrap_or_default();
-                let sigma = edges.end_sigma(limb) * branch_distance(limb).map_or(1.0, sigma_factor);
+                // The second branch counts against the limb where their ends differ by more than the distance from which a limb
+                // explains a point, and for it where they differ by less.
+                let factor = branch_distance(limb).map_or(1.0, |apart| (apart / EXPLAINED).sqrt());
+                let sigma = edges.end_sigma(limb) * factor;
                 // A standard deviation of `EXPLAINED` suffices. Full support of a limb by color reduces its uncertainty by a factor
                 // of e.
                 log_odds[limb] = own * visible - (sigma / EXPLAINED).ln();
@@ -46,7 +43,7 @@ impl Assessor {
     }
 
     /// Discards all evidence from color edges.
-    pub(super) fn forget_edges(&mut self) {
+    pub(in crate::tracker) fn forget_edges(&mut self) {
         self.edges.forget();
         self.by_edges = false;
     }

@@ -2,7 +2,7 @@
 
 use crate::body::Body;
 use crate::hypotheses::ROUGH_SAMPLE;
-use crate::math::{Points, Pose, widest};
+use crate::math::{Points, Pose, reset, widest};
 use crate::observation::candidates::Candidates;
 use crate::visibility::EXPLAINED;
 
@@ -29,16 +29,6 @@ struct SampleNearest {
 }
 
 impl SampleNearest {
-    /// Resets the arrays for `count` points, before any limb was compared.
-    fn begin(&mut self, count: usize) {
-        self.distance.clear();
-        self.distance.resize(count, f32::INFINITY);
-        for numbers in [&mut self.limb, &mut self.near] {
-            numbers.clear();
-            numbers.resize(count, 0);
-        }
-    }
-
     /// Updates the arrays with the distances of all sample points to one limb.
     fn offer(&mut self, limb: u32, distances: &[f32]) {
         let own = self.limb.iter_mut().zip(&mut self.distance).zip(&mut self.near);
@@ -63,8 +53,7 @@ impl Exclusive {
         let count = poses.len();
         let pixels = candidates.cameras.last().map_or(0, |(end, _)| *end as usize);
         for counts in [&mut *weight, &mut *clouds] {
-            counts.clear();
-            counts.resize(count, 0.0);
+            reset(counts, count, 0.0);
         }
         let step = (candidates.len() / ROUGH_SAMPLE).max(1);
         let points = &candidates.points;
@@ -73,7 +62,10 @@ impl Exclusive {
             sample.push([points.x[index], points.y[index], points.z[index]]);
         }
         all.clear();
-        nearest.begin(sample.len());
+        reset(&mut nearest.distance, sample.len(), f32::INFINITY);
+        for numbers in [&mut nearest.limb, &mut nearest.near] {
+            reset(numbers, sample.len(), 0);
+        }
         for (index, (limb, pose)) in (0..).zip(body.limbs().iter().zip(poses)) {
             limb.shape.approximate_distances(pose, sample, distances);
             distances.iter_mut().for_each(|distance| *distance = distance.abs());

@@ -1,53 +1,37 @@
 //! Odds that the pose of one limb is right, accumulated over a few frames because single frames are noisy.
 
-use super::two_state::TwoState;
+use super::two_state::{is_uncertain, updated};
 use crate::math::Vec3;
 use crate::tracker::estimate::LimbStatus;
 use crate::visibility::LITTLE;
 
-/// Filters of one limb, and what the cameras see where it is.
+/// Odds of one limb, and what the cameras see where it is.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct LimbFilter {
-    /// Filters for two events: the limb is right, and so is its distal end.
-    states: [TwoState; 2],
+    /// Log odds of two events: the limb is right, and so is its distal end.
+    pub(super) log_odds: [f64; 2],
     /// Fraction of the front-facing patches that this frame violates by free space.
-    contradicted: f64,
+    pub(super) contradicted: f64,
     /// Fraction of them that are unoccluded.
-    visible: f64,
+    pub(super) visible: f64,
     /// Displacement of the distal end in the last frame, and its difference to the displacement in the frame before, meters.
     motion: Vec3,
-    unexpected: f64,
+    pub(super) unexpected: f64,
 }
 
 impl LimbFilter {
-    /// Takes what a frame shows of the limb's surface: the fractions violated by free space and unoccluded.
-    pub(super) fn see(&mut self, contradicted: f64, visible: f64) {
-        (self.contradicted, self.visible) = (contradicted, visible);
-    }
-
     /// Updates with the displacement of the distal end since the last frame, meters.
     pub(super) fn moved(&mut self, motion: Vec3) {
         self.unexpected = motion.distance(self.motion);
         self.motion = motion;
     }
 
-    /// Difference between the last two displacements of the distal end, meters.
-    pub(super) fn unexpected(&self) -> f64 {
-        self.unexpected
-    }
-
-    /// Updates both filters with the log odds from this frame's measurements for the limb and for its distal end, and with those
+    /// Updates both odds with the log odds from this frame's measurements for the limb and for its distal end, and with those
     /// from a detection. `unexpected` is the unexpected part of the motion, meters.
     pub(super) fn observe(&mut self, evidence: [f64; 2], detected: f64, unexpected: f64) {
-        self.states
-            .iter_mut()
-            .zip(evidence)
-            .for_each(|(state, evidence)| state.observe(evidence, detected, unexpected));
-    }
-
-    /// Log odds that the limb is right, and that its distal end is.
-    pub(super) fn log_odds(&self) -> [f64; 2] {
-        self.states.map(|state| state.log_odds())
+        for (log_odds, evidence) in self.log_odds.iter_mut().zip(evidence) {
+            *log_odds = updated(*log_odds, evidence, detected, unexpected);
+        }
     }
 
     /// Whether the cameras see where the limb is.
@@ -69,7 +53,7 @@ impl LimbFilter {
 
     /// Whether the evidence for or against the limb is weak.
     pub(super) fn is_uncertain(&self) -> bool {
-        self.states[0].is_uncertain()
+        is_uncertain(self.log_odds[0])
     }
 }
 
@@ -82,10 +66,10 @@ mod tests {
     fn after(frames: &[[f64; 3]]) -> LimbStatus {
         let mut limb = LimbFilter::default();
         for [supporting, contradicted, visible] in frames {
-            limb.see(*contradicted, *visible);
+            (limb.contradicted, limb.visible) = (*contradicted, *visible);
             limb.observe([support_log_odds(supporting - contradicted); 2], 0.0, 0.0);
         }
-        limb.status(limb.log_odds()[0])
+        limb.status(limb.log_odds[0])
     }
 
     #[test]
@@ -107,7 +91,7 @@ mod tests {
     fn a_limb_may_be_right_and_its_end_not() {
         let mut limb = LimbFilter::default();
         limb.observe([2.0, -1.0], 0.0, 0.0);
-        let [whole, end] = limb.log_odds().map(|log_odds| limb.status(log_odds));
+        let [whole, end] = limb.log_odds.map(|log_odds| limb.status(log_odds));
         assert_eq!([whole, end], [LimbStatus::Measured, LimbStatus::Inferred]);
     }
 }

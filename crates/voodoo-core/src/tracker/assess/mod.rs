@@ -17,7 +17,6 @@ mod detected;
 mod edges;
 mod exclusive;
 mod limb_filter;
-mod spread;
 mod two_state;
 
 use super::estimate::{Estimate, LimbStatus, Status};
@@ -26,9 +25,9 @@ use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Model};
 use crate::detect::Detected;
 use crate::fit::{Context, Matched};
-use crate::math::{Pose, Vec3};
+use crate::math::{Pose, Vec3, refill, reset};
 use crate::terms::APART;
-use crate::uncertainty::{EdgeFilter, Uncertainty};
+use crate::uncertainty::EdgeFilter;
 use crate::visibility::limb_support::{LimbSupport, measure_support};
 use crate::visibility::render::LimbRaycaster;
 use crate::visibility::roundness::roundness;
@@ -71,7 +70,6 @@ pub(super) struct Assessor {
     exclusive: Exclusive,
     raycasters: Vec<LimbRaycaster>,
     supports: Vec<LimbSupport>,
-    uncertainty: Uncertainty,
     edges: EdgeFilter,
     /// Whether color edges are the only evidence.
     by_edges: bool,
@@ -91,15 +89,9 @@ impl Assessor {
         self.status = status;
     }
 
-    /// Restarts the evidence after the body was moved: only the current frame counts at the new position.
+    /// Restarts the evidence after the body was moved, or its pose set by somebody else than the user: only the current frame counts.
     pub(super) fn moved(&mut self) {
         self.limbs.clear();
-        self.round = [ROUND[1]; 2];
-    }
-
-    /// Starts with a pose that the user did not set: the evidence of the current frame decides.
-    pub(super) fn distrust_pose(&mut self) {
-        self.forget_limbs();
         self.round = [ROUND[1]; 2];
     }
 
@@ -140,15 +132,13 @@ impl Assessor {
         }
         self.update_limbs(context, matched, detected);
         let Self { limbs, internal, log_odds, .. } = self;
-        log_odds.clear();
-        log_odds.extend(limbs.iter().map(|limb| limb.log_odds()[0]));
-        internal.clear();
-        internal.extend(limbs.iter().zip(log_odds.iter()).map(|(limb, log_odds)| limb.status(*log_odds)));
+        refill(log_odds, limbs.iter().map(|limb| limb.log_odds[0]));
+        refill(internal, limbs.iter().map(|limb| limb.status(limb.log_odds[0])));
         for chain in &context.model.extremities {
             // Hands and feet have too few patches for odds of their own.
             for end in &chain.ends {
                 internal[*end] = internal[chain.lower];
-                log_odds[*end] = limbs[chain.lower].log_odds()[1];
+                log_odds[*end] = limbs[chain.lower].log_odds[1];
             }
         }
         self.status = overall(internal, |limb| limbs[limb].is_visible());
@@ -167,18 +157,16 @@ impl Assessor {
     /// reported as tracked.
     pub(super) fn report_status(&self, model: &Model, estimate: &mut Estimate) {
         let Estimate { limb_status: statuses, limb_probability: probabilities, .. } = estimate;
-        statuses.clear();
-        probabilities.clear();
         if self.internal.is_empty() {
             // A pose that was set, before its first frame.
-            statuses.resize(model.body.limbs().len(), LimbStatus::Inferred);
-            probabilities.resize(model.body.limbs().len(), f64::NAN);
+            reset(statuses, model.body.limbs().len(), LimbStatus::Inferred);
+            reset(probabilities, model.body.limbs().len(), f64::NAN);
             estimate.status = self.status;
             return;
         }
-        statuses.extend(self.limbs.iter().zip(&self.log_odds).map(|(limb, log_odds)| limb.status(*log_odds)));
+        refill(statuses, self.limbs.iter().zip(&self.log_odds).map(|(limb, log_odds)| limb.status(*log_odds)));
         let [even, factor] = WITHIN_10_CM;
-        probabilities.extend(self.log_odds.iter().map(|log_odds| probability(even + factor * log_odds)));
+        refill(probabilities, self.log_odds.iter().map(|log_odds| probability(even + factor * log_odds)));
         let status = if self.by_edges { overall(statuses, |_| true) } else { self.status };
         // Nothing may match a pose that was set, however much was measured.
         let sources = &estimate.sources;
@@ -227,7 +215,7 @@ impl Assessor {
             }
             // Depth images do not contradict a limb that point clouds of other sensors measure.
             support.known &= self.exclusive.clouds[limb] < FEW;
-            filter.see(now[1], now[2]);
+            [_, filter.contradicted, filter.visible] = now;
             self.evidence.push(support_log_odds(now[0]));
             let far_end =
                 |poses: &[Pose]| poses.get(limb).map(|pose| *pose * (body.limbs()[limb].shape.length() * Vec3::Z));
@@ -259,7 +247,7 @@ impl Assessor {
                 [all_log_odds(&[upper, lower]), all_log_odds(&[upper, lower, lower_end])],
             ];
             let others = [evidence[chain.upper], all_log_odds(&both.map(|limb| evidence[limb]))];
-            let unexpected = limbs[chain.upper].unexpected().max(limbs[chain.lower].unexpected());
+            let unexpected = limbs[chain.upper].unexpected.max(limbs[chain.lower].unexpected);
             let next = [Some(chain.lower), chain.ends.first().copied()];
             for (number, limb) in both.into_iter().enumerate() {
                 if !supports[limb].known {

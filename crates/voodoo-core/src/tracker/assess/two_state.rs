@@ -15,32 +15,19 @@ const CHANGES: f64 = 0.05;
 /// prediction is proportional to it.
 const FAR: f64 = 0.15;
 
-/// Log odds that a limb is right.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct TwoState {
-    log_odds: f64,
+/// Returns the log odds that a limb is right, given those before the frame, and those from the frame's images and from a detector,
+/// after a motion of which `unexpected` meters were not predicted.
+pub(super) fn updated(log_odds: f64, images: f64, detector: f64, unexpected: f64) -> f64 {
+    let before = probability(log_odds);
+    let goes_wrong = (CHANGES + (unexpected / FAR).powi(2)).min(1.0);
+    let now = before * (1.0 - goes_wrong) + (1.0 - before) * CHANGES;
+    let evidence = [images, detector].map(|value| value.clamp(-max_log_odds(), max_log_odds()));
+    (now / (1.0 - now)).ln() + evidence[0] + evidence[1]
 }
 
-impl TwoState {
-    /// Updates with the log odds from a frame's images and from a detector, after a motion of which `unexpected` meters were not
-    /// predicted.
-    pub(super) fn observe(&mut self, images: f64, detector: f64, unexpected: f64) {
-        let before = probability(self.log_odds);
-        let goes_wrong = (CHANGES + (unexpected / FAR).powi(2)).min(1.0);
-        let now = before * (1.0 - goes_wrong) + (1.0 - before) * CHANGES;
-        let evidence = [images, detector].map(|value| value.clamp(-max_log_odds(), max_log_odds()));
-        self.log_odds = (now / (1.0 - now)).ln() + evidence[0] + evidence[1];
-    }
-
-    /// Log odds that the limb is right.
-    pub(super) fn log_odds(&self) -> f64 {
-        self.log_odds
-    }
-
-    /// Whether the log odds are smaller than the evidence of a frame without any support.
-    pub(super) fn is_uncertain(&self) -> bool {
-        self.log_odds.abs() < -support_log_odds(0.0)
-    }
+/// Whether log odds are smaller than the evidence of a frame without any support.
+pub(super) fn is_uncertain(log_odds: f64) -> bool {
+    log_odds.abs() < -support_log_odds(0.0)
 }
 
 /// Returns the log odds that a limb is right, from the fraction of its surface that supports it minus the one that contradicts
@@ -77,9 +64,7 @@ mod tests {
 
     /// Log odds after frames with this evidence of images, and unexpected motion.
     fn after(frames: &[(f64, f64)]) -> f64 {
-        let mut state = TwoState::default();
-        frames.iter().for_each(|(evidence, moved)| state.observe(*evidence, 0.0, *moved));
-        state.log_odds()
+        frames.iter().fold(0.0, |log_odds, (evidence, moved)| updated(log_odds, *evidence, 0.0, *moved))
     }
 
     #[test]
@@ -101,13 +86,11 @@ mod tests {
     #[test]
     fn one_detection_does_not_reverse_a_confident_state_and_two_reverse_it_without_images() {
         let detection = -20.0;
-        let mut state = TwoState::default();
-        (0..5).for_each(|_| state.observe(max_log_odds(), 0.0, 0.0));
-        state.observe(max_log_odds(), detection, 0.0);
-        assert!(state.log_odds() >= 0.0 && !state.is_uncertain());
-        state.observe(0.0, detection, 0.0);
-        state.observe(0.0, detection, 0.0);
-        assert!(state.log_odds() < 0.0 && TwoState::default().is_uncertain());
+        let confident = (0..5).fold(0.0, |log_odds, _| updated(log_odds, max_log_odds(), 0.0, 0.0));
+        let once = updated(confident, max_log_odds(), detection, 0.0);
+        assert!(once >= 0.0 && !is_uncertain(once));
+        let twice = (0..2).fold(once, |log_odds, _| updated(log_odds, 0.0, detection, 0.0));
+        assert!(twice < 0.0 && is_uncertain(0.0));
     }
 
     #[test]
