@@ -62,14 +62,9 @@ pub(crate) enum DetectionVerdict {
 
 /// Whether the trunk was detected elsewhere than at these poses, whose frame has its origin at `origin` in the world.
 pub(crate) fn trunk_is_elsewhere(detected: Detected, body: &Body, poses: &[Pose], origin: Vec3) -> bool {
-    let [apart, spread] = joint_distance(detected, body, poses, origin, detected.map.trunk());
-    apart > ELSEWHERE && apart > SIGMAS * spread
-}
-
-/// Returns the mean distance of detected joints from the tracked ones, and the mean of their standard deviations, meters.
-fn joint_distance(detected: Detected, body: &Body, poses: &[Pose], origin: Vec3, joints: &[usize]) -> [f64; 2] {
+    // The mean distance of detected joints from the tracked ones, and the mean of their standard deviations, meters.
     let (mut apart, mut spread, mut count) = (0.0, 0.0, 0.0_f64);
-    for joint in joints {
+    for joint in detected.map.trunk() {
         if let (Some(detected), Some(site)) = (detected.joint(*joint), detected.map.site(*joint)) {
             let tracked: Vec3 = body.site_position(poses, site) + origin;
             apart += detected.position.distance(tracked);
@@ -77,30 +72,36 @@ fn joint_distance(detected: Detected, body: &Body, poses: &[Pose], origin: Vec3,
             count += 1.0;
         }
     }
-    [apart, spread].map(|sum| sum / count.max(1.0))
+    let [apart, spread] = [apart, spread].map(|sum| sum / count.max(1.0));
+    apart > ELSEWHERE && apart > SIGMAS * spread
 }
 
 /// Evidence of detections about a track, and when the detector is due.
 #[derive(Debug, Default)]
-pub(super) struct DetectionCheck {
+pub(crate) struct DetectionCheck {
     /// The track was auto-initialized by the detector.
-    pub(super) auto_initialized: bool,
+    pub(crate) auto_initialized: bool,
     /// Stamp of the start, seconds.
     since: Option<f64>,
     /// Stamp of the last detection that counted, seconds.
     last_detection: Option<f64>,
     /// Whether the detection of this frame counts against the track's being a person: those of following frames are alike.
     counts: bool,
-    /// Whether a detection agreed with the track.
-    pub(super) confirmed: bool,
+    /// Whether a detection agreed with the track, or one elsewhere was of somebody else.
+    pub(crate) confirmed: bool,
     /// Log odds that the person is elsewhere, and that the tracked object is not a person.
     pub(super) elsewhere: f64,
     false_track: f64,
 }
 
 impl DetectionCheck {
+    /// Whether a detection confirmed the track.
+    pub(crate) fn is_detected(&self) -> bool {
+        self.auto_initialized || self.confirmed
+    }
+
     /// Whether the track was started less than a second ago.
-    pub(super) fn is_new(&self, stamp: f64) -> bool {
+    pub(crate) fn is_new(&self, stamp: f64) -> bool {
         self.since.is_none_or(|since| stamp - since < NEW_TRACK_AGE)
     }
 

@@ -15,6 +15,7 @@ use crate::fit::{Context, Fit, UNKNOWN_MOTION};
 use crate::math::{Aabb, Pose, Vec3, shifted};
 use crate::observation::candidates::{Candidates, body_box};
 use crate::observation::frame::Ground;
+use crate::tracker::estimate::Status;
 use detection_check::{DetectionCheck, SIGMAS};
 pub(crate) use detection_check::{DetectionVerdict, Reasons};
 pub(crate) use detection_check::{ENOUGH_ODDS, distance_cost, trunk_is_elsewhere};
@@ -24,29 +25,21 @@ use trials::Trials;
 /// Number of consecutive frames after which a lost body counts as lost.
 const PATIENCE: usize = 2;
 
-/// Outcome of a frame for the body.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct FrameOutcome {
-    /// The body is lost.
-    pub lost: bool,
-    /// The body is tracked, neither lost nor degraded.
-    pub tracked: bool,
-    /// Known depth cameras gave no image, so the frame is no evidence that the body left.
-    pub silent: bool,
-}
-
 /// Finds bodies. Stores the evidence of past detections and for how long the body has been lost.
 #[derive(Debug, Default)]
 pub(crate) struct Relocalizer {
-    detector: BoundDetector,
-    detection: Option<PlacedDetection>,
+    /// The detector of persons, bound to the body.
+    pub(crate) detector: BoundDetector,
+    /// The detection of this frame.
+    pub(crate) detection: Option<PlacedDetection>,
     /// Number of the image with the detection.
     image: usize,
     /// Log odds that the object at the queried position is a person; the largest over all images.
     person_odds: Option<f64>,
-    /// The floor on which the body stood when it was found, world frame.
-    floor: Option<Ground>,
-    check: DetectionCheck,
+    /// The floor that the detector found under an auto-initialized body, world frame. It is used where the ground plane is not
+    /// given.
+    pub(crate) floor: Option<Ground>,
+    pub(crate) check: DetectionCheck,
     /// Number of consecutive frames in which the body was lost.
     lost: usize,
     candidates: Candidates,
@@ -60,40 +53,9 @@ impl Relocalizer {
     pub(crate) fn restart(&mut self, model: &Model, poses: &[Pose]) {
         self.lost = 0;
         self.check = DetectionCheck::default();
-        self.bind(&model.body);
+        self.detector.bind(&model.body);
         self.floor = None;
         self.search.remember(poses);
-    }
-
-    /// Returns the floor that the detector found under an auto-initialized body, world frame. It is used where the ground plane
-    /// is not given.
-    pub(crate) fn floor(&self) -> Option<Ground> {
-        self.floor
-    }
-
-    /// Whether the track was auto-initialized by the detector.
-    pub(crate) fn is_auto_initialized(&self) -> bool {
-        self.check.auto_initialized
-    }
-
-    /// Whether a detection or a second of tracking confirmed the track.
-    pub(crate) fn is_confirmed(&self, stamp: f64) -> bool {
-        self.is_detected() || !self.is_new(stamp)
-    }
-
-    /// Notes that a detection elsewhere is somebody else.
-    pub(crate) fn confirm(&mut self) {
-        self.check.confirmed = true;
-    }
-
-    /// Whether a detection confirmed the track.
-    pub(crate) fn is_detected(&self) -> bool {
-        self.check.auto_initialized || self.check.confirmed
-    }
-
-    /// Whether the track was started less than a second ago.
-    pub(crate) fn is_new(&self, stamp: f64) -> bool {
-        self.check.is_new(stamp)
     }
 
     /// Whether the detection of this frame may be of a body of these sizes.
@@ -157,21 +119,20 @@ impl Relocalizer {
         &self.trials.poses
     }
 
-    /// Returns for how many frames the lost body has been searched: the count starts at the frame from which on a loss is not
-    /// just a blurred image. `None` if the body is not searched for.
-    pub(crate) fn frames_searched(&self) -> Option<usize> {
-        self.lost.checked_sub(PATIENCE)
+    /// Whether the lost body is searched for: from the frame on from which a loss is not just a blurred image.
+    pub(crate) fn is_searching(&self) -> bool {
+        self.lost >= PATIENCE
     }
 
-    /// Updates with the outcome of a frame for the body at these poses.
-    pub(crate) fn observe(&mut self, outcome: FrameOutcome, poses: &[Pose]) {
-        let FrameOutcome { lost, tracked, silent } = outcome;
-        if lost {
+    /// Updates with the status of the body, at these poses, after a frame. It is `silent` if known depth cameras gave no image, so
+    /// that it is no evidence that the body left.
+    pub(crate) fn observe(&mut self, status: Status, silent: bool, poses: &[Pose]) {
+        if status == Status::Lost {
             self.lost += usize::from(!silent);
-        } else if tracked || self.frames_searched().is_none() {
+        } else if status == Status::Tracking || !self.is_searching() {
             self.lost = 0;
         }
-        if tracked {
+        if status == Status::Tracking {
             self.search.remember(poses);
         }
     }
@@ -180,7 +141,7 @@ impl Relocalizer {
     /// `present`. The matches of `fit` are restored before it returns.
     pub(crate) fn search(&mut self, context: Context, fit: &mut Fit, present: &[Pose]) -> bool {
         let views = context.observation.views;
-        if self.frames_searched().is_none() || self.can_detect() && !views.frame.images.is_empty() {
+        if !self.is_searching() || self.detector.knows() && !views.frame.images.is_empty() {
             return false;
         }
         self.search.segments.find(views, context.config);
@@ -214,16 +175,15 @@ mod tests {
         let config = without_background();
         let mut relocalizer = Relocalizer::default();
         relocalizer.restart(&model, &present);
-        let outcome = |lost: bool| FrameOutcome { lost, tracked: !lost, silent: false };
         with_context(pixels, &config, &model, &present, |context| {
             let mut fit = Fit::new(&config).unwrap();
             fit.match_last(context, &present);
             let before = format!("{:?}", fit.correspondences());
-            for lost in [false, true] {
-                relocalizer.observe(outcome(lost), &present);
+            for status in [Status::Tracking, Status::Lost] {
+                relocalizer.observe(status, false, &present);
                 assert!(!relocalizer.search(context, &mut fit, &present));
             }
-            relocalizer.observe(outcome(true), &present);
+            relocalizer.observe(Status::Lost, false, &present);
             let found = relocalizer.search(context, &mut fit, &present);
             let mut found = found.then(|| relocalizer.found().to_vec());
             assert_eq!(format!("{:?}", fit.correspondences()), before);
@@ -259,33 +219,28 @@ mod tests {
         }
     }
 
-    fn after(frames: impl IntoIterator<Item = FrameOutcome>) -> Option<usize> {
+    /// Whether the body is searched for after frames with these states of it.
+    fn after(frames: &[Status], silent: bool) -> bool {
         let mut relocalizer = Relocalizer::default();
-        frames.into_iter().for_each(|outcome| relocalizer.observe(outcome, &[]));
-        relocalizer.frames_searched()
-    }
-
-    fn outcome(lost: bool) -> FrameOutcome {
-        FrameOutcome { lost, tracked: !lost, silent: false }
+        frames.iter().for_each(|status| relocalizer.observe(*status, silent, &[]));
+        relocalizer.is_searching()
     }
 
     #[test]
     fn a_body_is_searched_for_from_the_second_lost_frame_on() {
-        let searched = |frames| after([outcome(true)].repeat(frames));
-        assert_eq!([1, 2, 3, 4].map(searched), [None, Some(0), Some(1), Some(2)]);
+        let searched = |frames| after(&[Status::Lost].repeat(frames), false);
+        assert_eq!([1, 2, 3, 4].map(searched), [false, true, true, true]);
     }
 
     #[test]
     fn a_single_lost_frame_is_ignored_and_frames_without_images_do_not_count() {
-        assert_eq!(after([false, true, false, true].map(outcome)), None);
-        let silent = FrameOutcome { silent: true, ..outcome(true) };
-        assert_eq!(after([silent; 20]), None);
+        assert!(!after(&[Status::Tracking, Status::Lost, Status::Tracking, Status::Lost], false));
+        assert!(!after(&[Status::Lost; 20], true));
     }
 
     #[test]
     fn a_tracked_body_is_no_longer_lost_and_a_degraded_one_is() {
-        let degraded = FrameOutcome { tracked: false, ..outcome(false) };
-        let back = |last| after([outcome(true), outcome(true), last]);
-        assert_eq!([outcome(false), degraded].map(back), [None, Some(0)]);
+        let back = |last| after(&[Status::Lost, Status::Lost, last], false);
+        assert_eq!([Status::Tracking, Status::Degraded].map(back), [false, true]);
     }
 }

@@ -4,48 +4,13 @@
 use super::detection_check::{ELSEWHERE, distance_cost};
 use super::{Reasons, Relocalizer};
 use crate::body::Body;
-use crate::detect::{Detect, DetectError, Detected, DetectionQuery, JointMap, PlacedDetection, Surroundings};
+use crate::detect::{Detected, DetectionQuery, PlacedDetection, Surroundings};
 use crate::math::Vec3;
 use crate::observation::frame::{Frame, Ground};
 use crate::observation::observer::Own;
 use crate::observation::ownership::OwnershipMask;
 
 impl Relocalizer {
-    /// Sets the detector that finds this body, or removes it.
-    pub(crate) fn set_detector(&mut self, detector: Option<Box<dyn Detect>>, body: &Body) {
-        self.detector.set(detector, body);
-    }
-
-    /// Rebinds the detector after the body's limbs or sites have changed.
-    pub(crate) fn bind(&mut self, body: &Body) {
-        self.detector.bind(body);
-    }
-
-    /// Whether the body can be found without a pose.
-    pub(crate) fn can_detect(&self) -> bool {
-        self.detector.knows()
-    }
-
-    /// Returns the map from the detector's joints to the body.
-    pub(crate) fn map(&self) -> &JointMap {
-        self.detector.map()
-    }
-
-    /// The error of the detector, if it failed since [`Self::clear_error`].
-    pub(crate) fn error(&self) -> Option<&DetectError> {
-        self.detector.error()
-    }
-
-    /// Clears the detector's last error.
-    pub(crate) fn clear_error(&mut self) {
-        self.detector.clear_error();
-    }
-
-    /// Takes this detection for the one of this frame.
-    pub(crate) fn set_detection(&mut self, detection: PlacedDetection) {
-        self.detection = Some(detection);
-    }
-
     /// Drops the detection of this frame if it is too far from a position, world frame, to be of a person who was tracked `elapsed`
     /// seconds before.
     pub(crate) fn forget_somebody_else(&mut self, root: Vec3, elapsed: f64) {
@@ -84,7 +49,7 @@ impl Relocalizer {
         reasons: Reasons,
     ) {
         self.forget();
-        if !self.check.is_due(frame.stamp, reasons, ownership.others) || !self.can_detect() {
+        if !self.check.is_due(frame.stamp, reasons, ownership.others) || !self.detector.knows() {
             return;
         }
         let query = if reasons.anywhere { DetectionQuery::Any } else { DetectionQuery::Near(root) };
@@ -124,7 +89,7 @@ fn floor_under(detection: Detected) -> Option<Ground> {
 mod tests {
     use super::*;
     use crate::body::HumanModel;
-    use crate::detect::{DetectedJoint, Detection};
+    use crate::detect::{DetectedJoint, Detection, JointMap};
 
     #[test]
     fn a_plane_at_the_ankles_is_the_floor_and_one_at_another_height_is_not() {

@@ -62,19 +62,13 @@ impl BodyTracker {
         // The motion restarts because the previous poses belong to another body.
         motion.forget();
         hypotheses.restart();
-        relocalizer.bind(&model.body);
+        relocalizer.detector.bind(&model.body);
         if motion.poses.is_empty() {
             return;
         }
-        for (index, limb) in model.body.limbs().iter().enumerate() {
-            if let Some((parent, joint)) = &limb.parent {
-                let center = motion.poses[*parent] * joint.parent_from_joint.translation;
-                let pose = &mut motion.poses[index];
-                pose.translation = center - pose.rotation * joint.limb_from_joint.translation;
-            }
-        }
+        model.body.close_joints(&mut motion.poses);
         fit.clear();
-        sizes.edited(model, relocalizer.map());
+        sizes.edited(model, relocalizer.detector.map());
         relocalizer.restart(model, &motion.poses);
         assessor.edited(estimate.status);
         self.report(self.motion.stamp.unwrap_or(f64::NAN), 0, None);

@@ -18,7 +18,7 @@ use crate::observation::candidates::body_box;
 use crate::observation::frame::Frame;
 use crate::observation::observer::{Observer, Own};
 use crate::observation::ownership::OwnershipMask;
-use crate::relocalize::{DetectionVerdict, FrameOutcome, Reasons, Relocalizer, trunk_is_elsewhere};
+use crate::relocalize::{DetectionVerdict, Reasons, Relocalizer, trunk_is_elsewhere};
 use crate::sizes::{Reliance, Sizes, Start};
 use crate::uncertainty::{FittedPose, Uncertainty};
 use assess::Assessor;
@@ -86,17 +86,17 @@ impl BodyTracker {
 
     /// Replaces the detector, or removes it.
     pub(crate) fn set_detector(&mut self, detector: Option<Box<dyn Detect>>) {
-        self.relocalizer.set_detector(detector, &self.model.body);
+        self.relocalizer.detector.set(detector, &self.model.body);
     }
 
     /// Whether the tracker searches for the body while it has no pose: it has a detector that supports this body.
     pub fn can_search(&self) -> bool {
-        self.relocalizer.can_detect()
+        self.relocalizer.detector.knows()
     }
 
     /// The error of the detector in the last step, if it failed. The step then ran without detections.
     pub(crate) fn detector_error(&self) -> Option<&DetectError> {
-        self.relocalizer.error()
+        self.relocalizer.detector.error()
     }
 
     /// Sets the pose, and with `fit_sizes` the sizes, from positions of named sites (index of the site, world position). Sizes
@@ -140,12 +140,12 @@ impl BodyTracker {
     /// Updates the pose with the pixels and points of a frame, which the caller has checked, that show this body or nobody (K06
     /// IV-B). A body without a pose stays without.
     pub(crate) fn step(&mut self, frame: &Frame, ownership: OwnershipMask) {
-        self.relocalizer.clear_error();
+        self.relocalizer.detector.clear_error();
         self.moved_to = None;
         if self.is_started() {
             self.before.keep(&self.estimate);
             // Where the ground plane is not given, the one that the detector found under the body is used.
-            let frame = &Frame { ground: frame.ground.or(self.relocalizer.floor()), ..*frame };
+            let frame = &Frame { ground: frame.ground.or(self.relocalizer.floor), ..*frame };
             self.relocate(frame, ownership);
             self.track(frame, ownership);
         }
@@ -156,7 +156,7 @@ impl BodyTracker {
     fn restart_at_detection(&mut self) -> bool {
         let set = self.sizes.initial_body().unwrap_or(&self.model.body);
         let Some((body, poses)) = self.relocalizer.fit_detected(&self.model, Some(set)) else { return false };
-        let (known, auto_initialized) = (self.sizes.known(), self.relocalizer.is_auto_initialized());
+        let (known, auto_initialized) = (self.sizes.known(), self.relocalizer.check.auto_initialized);
         self.restart(body, poses, !known);
         self.relocalizer.record_start(auto_initialized);
         if !known {
@@ -182,7 +182,7 @@ impl BodyTracker {
         detection: PlacedDetection,
         known: bool,
     ) -> bool {
-        self.relocalizer.set_detection(detection);
+        self.relocalizer.detection = Some(detection);
         let known = known && self.relocalizer.detects_sizes_of(&self.model.body);
         let set = known.then_some(&self.model.body);
         let Some((body, poses)) = self.relocalizer.fit_detected(&self.model, set) else { return false };
@@ -213,11 +213,11 @@ impl BodyTracker {
     /// Moves the lost body to a detection of the frame that was stepped last, if that explains the frame better. Returns whether
     /// the person is there.
     pub(crate) fn recover(&mut self, frame: &Frame, ownership: OwnershipMask, detection: PlacedDetection) -> bool {
-        self.relocalizer.set_detection(detection);
+        self.relocalizer.detection = Some(detection);
         if !self.is_at_detection(frame, ownership) || !self.move_to_found(frame, ownership) {
             return false;
         }
-        if self.relocalizer.is_new(frame.stamp) && self.restart_at_detection() {
+        if self.relocalizer.check.is_new(frame.stamp) && self.restart_at_detection() {
             self.track(frame, ownership);
         } else {
             self.report(frame.stamp, 0, Some(1.0));
@@ -257,7 +257,7 @@ impl BodyTracker {
             relocalizer.forget();
         } else {
             relocalizer.detect(&model.body, frame, ownership, root, reasons);
-            if let Some(last) = motion.stamp.filter(|_| !interrupted && relocalizer.is_detected()) {
+            if let Some(last) = motion.stamp.filter(|_| !interrupted && relocalizer.check.is_detected()) {
                 relocalizer.forget_somebody_else(root, frame.stamp - last);
             }
         }
@@ -266,7 +266,7 @@ impl BodyTracker {
                 Some(DetectionVerdict::Elsewhere) if self.is_at_detection(frame, ownership) => {
                     let moved = self.motion.stamp.is_none() || self.move_to_found(frame, ownership);
                     // A new track restarts there, because sizes and scene were learned at the wrong position.
-                    if moved && self.relocalizer.is_new(frame.stamp) {
+                    if moved && self.relocalizer.check.is_new(frame.stamp) {
                         self.restart_at_detection();
                     }
                     self.relocalizer.forget();
@@ -274,7 +274,7 @@ impl BodyTracker {
                     self.assessor.moved();
                 }
                 Some(DetectionVerdict::Consistent) => self.update_sizes(),
-                Some(DetectionVerdict::Elsewhere) => self.relocalizer.confirm(),
+                Some(DetectionVerdict::Elsewhere) => self.relocalizer.check.confirmed = true,
                 Some(DetectionVerdict::Inconsistent) => {}
                 None => self.move_to_segment(frame, ownership),
             }
@@ -329,7 +329,7 @@ impl BodyTracker {
         fit.learn_regions(setting.with_model(model));
         hypotheses.forget_motion(model, motion);
         motion.commit(frame.stamp);
-        self.relocalizer.observe(self.frame_outcome(frame), &self.motion.poses);
+        self.relocalizer.observe(self.assessor.status(), self.observer.silent(frame), &self.motion.poses);
         self.report(frame.stamp, steps, Some(time_scale));
         if self.relocalizer.is_false_track() {
             self.stop(frame.stamp);
@@ -338,7 +338,7 @@ impl BodyTracker {
 
     /// Whether a detection or a second of tracking confirmed the track.
     pub(crate) fn is_confirmed(&self, stamp: f64) -> bool {
-        self.relocalizer.is_confirmed(stamp)
+        self.relocalizer.check.is_detected() || !self.relocalizer.check.is_new(stamp)
     }
 
     /// Checks the frame and the state of the tracker before anything changes.
@@ -371,7 +371,7 @@ impl BodyTracker {
     /// Moves a lost body that cannot be detected to a segment that it explains better.
     fn move_to_segment(&mut self, frame: &Frame, ownership: OwnershipMask) {
         let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
-        if relocalizer.frames_searched().is_none() {
+        if !relocalizer.is_searching() {
             return;
         }
         observer.begin(frame, ownership);
@@ -416,16 +416,6 @@ impl BodyTracker {
     /// Index of the image and pixels of the detection to which the body was moved in this frame: they show no scene.
     pub(crate) fn moved_to(&self) -> Option<(usize, &[usize])> {
         self.moved_to.as_ref().map(|(image, pixels)| (*image, pixels.as_slice()))
-    }
-
-    /// Summarizes the frame's assessment for the relocalizer.
-    fn frame_outcome(&self, frame: &Frame) -> FrameOutcome {
-        let status = self.assessor.status();
-        FrameOutcome {
-            lost: status == Status::Lost,
-            tracked: status == Status::Tracking,
-            silent: self.observer.silent(frame),
-        }
     }
 
     /// Fills the estimate: for a frame `time_scale` after the last one, or, with `None`, for a pose that was set.
