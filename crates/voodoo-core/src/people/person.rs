@@ -85,7 +85,7 @@ impl Person {
 
     /// Whether the person is present and not lost.
     pub(super) fn is_tracked(&self) -> bool {
-        self.present && !matches!(self.tracker.estimate().status, Status::Lost | Status::Searching)
+        self.present && self.tracker.is_there()
     }
 
     /// Updates the stature with a detection. The errors of successive detections are correlated, so the variance of the mean is

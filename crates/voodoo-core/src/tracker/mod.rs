@@ -104,7 +104,7 @@ impl BodyTracker {
     /// a reset may start again from any time. On error the tracker is unchanged.
     pub(crate) fn reset(&mut self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<&Estimate, TrackError> {
         let (body, poses) = self.model.fit(positions, fit_sizes)?;
-        self.restart(body, poses, fit_sizes);
+        self.restart(body, poses, if fit_sizes { Start::Positions } else { Start::SizesKnown });
         self.relocalizer.forget();
         Ok(&self.estimate)
     }
@@ -119,19 +119,18 @@ impl BodyTracker {
                 format!("{} pose(s) for {count} limbs", world_from_limb.len()),
             ));
         }
-        self.restart(self.model.body.clone(), world_from_limb.to_vec(), false);
+        self.restart(self.model.body.clone(), world_from_limb.to_vec(), Start::SizesKnown);
         self.relocalizer.forget();
         Ok(&self.estimate)
     }
 
-    fn restart(&mut self, body: Body, world_from_limb: Vec<Pose>, fit_sizes: bool) {
+    fn restart(&mut self, body: Body, world_from_limb: Vec<Pose>, start: Start) {
         self.model.adopt(body);
         self.motion.restart(world_from_limb);
         self.observer.clear();
         self.fit.clear();
         self.hypotheses.restart();
         self.relocalizer.restart(&self.model, &self.motion.poses);
-        let start = if fit_sizes { Start::Positions } else { Start::SizesKnown };
         self.sizes.restart(&self.model, start, &self.config);
         self.assessor.trust_pose();
         self.report(f64::NAN, 0, None);
@@ -155,15 +154,21 @@ impl BodyTracker {
     /// ones. Returns whether it could.
     fn restart_at_detection(&mut self) -> bool {
         let set = self.sizes.initial_body().unwrap_or(&self.model.body);
-        let Some((body, poses)) = self.relocalizer.fit_detected(&self.model, Some(set)) else { return false };
-        let (known, auto_initialized) = (self.sizes.known(), self.relocalizer.check.auto_initialized);
-        self.restart(body, poses, !known);
-        self.relocalizer.record_start(auto_initialized);
-        if !known {
-            self.sizes.restart(&self.model, Start::Detected, &self.config);
-            self.update_sizes();
-        }
+        let Some(fitted) = self.relocalizer.fit_detected(&self.model, Some(set)) else { return false };
+        self.restart_fitted(fitted, self.sizes.known(), self.relocalizer.check.auto_initialized);
         true
+    }
+
+    /// Restarts the track with the body and its poses that fit the current detection.
+    fn restart_fitted(&mut self, (body, poses): (Body, Vec<Pose>), sizes_known: bool, auto_initialized: bool) {
+        self.restart(body, poses, if sizes_known { Start::SizesKnown } else { Start::Detected });
+        self.relocalizer.record_start(auto_initialized);
+        self.update_sizes();
+    }
+
+    /// Whether the last estimate has a body that is not lost.
+    pub(crate) fn is_there(&self) -> bool {
+        !matches!(self.estimate.status, Status::Lost | Status::Searching)
     }
 
     /// Updates the sizes with the detection of this frame, if there is one.
@@ -185,17 +190,12 @@ impl BodyTracker {
         self.relocalizer.detection = Some(detection);
         let known = known && self.relocalizer.detects_sizes_of(&self.model.body);
         let set = known.then_some(&self.model.body);
-        let Some((body, poses)) = self.relocalizer.fit_detected(&self.model, set) else { return false };
-        self.restart(body, poses, !known);
+        let Some(fitted) = self.relocalizer.fit_detected(&self.model, set) else { return false };
+        self.restart_fitted(fitted, known, true);
         self.before.keep(&self.estimate);
         self.assessor.moved();
-        self.relocalizer.record_start(true);
-        if !known {
-            self.sizes.restart(&self.model, Start::Detected, &self.config);
-            self.update_sizes();
-        }
         self.track(frame, ownership);
-        !matches!(self.estimate.status, Status::Lost | Status::Searching)
+        self.is_there()
     }
 
     /// Starts the track at the frame's measured positions, whose sizes the body gets with `fit_sizes`. Returns whether the person
@@ -207,7 +207,7 @@ impl BodyTracker {
         if started {
             self.step(frame, ownership);
         }
-        started && !matches!(self.estimate.status, Status::Lost | Status::Searching)
+        started && self.is_there()
     }
 
     /// Moves the lost body to a detection of the frame that was stepped last, if that explains the frame better. Returns whether
@@ -222,7 +222,7 @@ impl BodyTracker {
         } else {
             self.report(frame.stamp, 0, Some(1.0));
         }
-        !matches!(self.estimate.status, Status::Lost | Status::Searching)
+        self.is_there()
     }
 
     /// Removes the pose: no person is there. From the next frame on the tracker searches for one.
