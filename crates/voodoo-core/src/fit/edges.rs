@@ -2,19 +2,8 @@
 
 use super::{Context, Fit};
 use crate::math::Pose;
-use crate::regions::ColorRegions;
 
 impl Fit {
-    /// Returns the colors of limbs and surroundings.
-    pub(crate) fn regions(&self) -> &ColorRegions {
-        &self.regions
-    }
-
-    /// Returns the colors of limbs and surroundings for modification.
-    pub(crate) fn regions_mut(&mut self) -> &mut ColorRegions {
-        &mut self.regions
-    }
-
     /// Learns the colors in new cameras at the predicted pose.
     pub(crate) fn begin_regions(&mut self, context: Context, poses: &[Pose]) {
         if context.config.regions {

@@ -32,9 +32,12 @@ pub(crate) struct Fit {
     solver: Box<dyn Solver>,
     assignment: Assignment,
     buried: Buried,
-    correspondences: Correspondences,
-    contours: Contours,
-    regions: regions::ColorRegions,
+    /// The last correspondences.
+    pub(crate) correspondences: Correspondences,
+    /// The depth-contour edges that were found last.
+    pub(crate) contours: Contours,
+    /// The colors of limbs and surroundings.
+    pub(crate) regions: regions::ColorRegions,
     /// Joints that a detector found in this frame, and where it found the limbs.
     detected: Vec<MeasuredJoint>,
     detected_limbs: DetectedLimbs,
@@ -80,11 +83,6 @@ impl Fit {
     pub(crate) fn forget_detected(&mut self) {
         self.detected.clear();
         self.detected_limbs.clear();
-    }
-
-    /// Returns the last correspondences.
-    pub(crate) fn correspondences(&self) -> &Correspondences {
-        &self.correspondences
     }
 
     /// Returns the last correspondences together with `poses`, at which they were found.
@@ -136,12 +134,6 @@ impl Fit {
         steps
     }
 
-    /// Runs one ICP step (2 to 7) with new associations.
-    pub(crate) fn step(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose], step: usize) {
-        self.match_all(context, poses, step);
-        self.solve(context, predicted, poses, step);
-    }
-
     /// Steps 2 to 5 at `poses`: turns all measurements into correspondences.
     pub(crate) fn match_all(&mut self, context: Context, poses: &[Pose], step: usize) {
         let gate = Gate::new(context.config, step);
@@ -183,11 +175,6 @@ impl Fit {
     pub(crate) fn match_contour(&mut self, context: Context, poses: &[Pose]) {
         self.find_contour(context, poses);
         self.contours.pairs(poses, &mut self.correspondences.contour);
-    }
-
-    /// Returns the depth-contour edges that were found last.
-    pub(crate) fn contours(&self) -> &Contours {
-        &self.contours
     }
 
     /// Computes the relative changes of length, one for each pair of limbs, that best fit the correspondences; see
@@ -355,7 +342,7 @@ mod tests {
         with_context(&pixels, &config, &model, &poses, |context| {
             let mut fit = Fit::new(&config).unwrap();
             fit.match_all(context, &poses, config.max_steps);
-            let written = |fit: &Fit| format!("{:?}", fit.correspondences());
+            let written = |fit: &Fit| format!("{:?}", fit.correspondences);
             let (before, mut matched) = (written(&fit), Correspondences::default());
             fit.swap_matches(&mut matched);
             fit.match_all(context, &moved(&poses, 0.05 * Vec3::X), config.max_steps);
@@ -363,7 +350,7 @@ mod tests {
             fit.swap_matches(&mut matched);
             assert_eq!(written(&fit), before);
             fit.clear();
-            assert_eq!(fit.correspondences().mean_squared_distance(), None);
+            assert_eq!(fit.correspondences.mean_squared_distance(), None);
         });
     }
 
@@ -375,8 +362,8 @@ mod tests {
             let mut fit = Fit::new(&config).unwrap();
             let mut matched = |distance: f64, poses: &[Pose]| {
                 fit.match_points(context, poses, &Gate { distance, ..GATE });
-                assert!(fit.correspondences().sites.is_empty() && fit.correspondences().contour.is_empty());
-                let limbs = fit.correspondences().limbs.iter();
+                assert!(fit.correspondences.sites.is_empty() && fit.correspondences.contour.is_empty());
+                let limbs = fit.correspondences.limbs.iter();
                 limbs.map(|limb| limb.accepted().0).sum::<usize>() as f64 / context.observation.candidates.len() as f64
             };
             assert!(matched(0.1, &poses) > 0.95);

@@ -96,7 +96,7 @@ impl Hypotheses {
             if by_colors {
                 let frame = context.observation.frame();
                 let is_other = |limb| chain.limbs().all(|own| own != limb);
-                fit.regions_mut().draw(frame, context.posed(poses), is_other);
+                fit.regions.draw(frame, context.posed(poses), is_other);
             }
             self.propose(Extremity::new(context, fit, poses, chain), detection);
             let (taken, better) = self.try_proposals(context, fit, poses, predicted);
@@ -148,7 +148,7 @@ impl Hypotheses {
         let most = context.observation.candidates.len();
         self.rough.make_room(most);
         make_room(&mut self.clusters.apart, most);
-        self.refined.matched.reserve(most.min(context.config.max_limb_points), fit.correspondences());
+        self.refined.matched.reserve(most.min(context.config.max_limb_points), &fit.correspondences);
     }
 
     /// Whether the frame contradicts an arm or leg: its alternatives are tested.
@@ -265,7 +265,7 @@ mod tests {
             let (mut fit, mut refined) = (Fit::new(&config).unwrap(), Refined::default());
             refined.clutter = 1.0;
             fit.match_last(context, &poses);
-            let before = format!("{:?}", fit.correspondences());
+            let before = format!("{:?}", fit.correspondences);
             let current = refined.cost(context, &mut fit, &poses);
             // One that is the current pose needs no step.
             for (tried, expected) in [(raised(&model, &poses, 0.2).0, REFINE), (poses.clone(), 0)] {
@@ -274,7 +274,7 @@ mod tests {
                 assert!(!better && steps == expected, "{steps}");
                 assert!(present == poses && predicted == poses);
             }
-            assert_eq!(format!("{:?}", fit.correspondences()), before);
+            assert_eq!(format!("{:?}", fit.correspondences), before);
         });
     }
 }

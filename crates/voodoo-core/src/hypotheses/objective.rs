@@ -100,10 +100,10 @@ mod tests {
             let mut fit = Fit::new(&config).unwrap();
             let mut cost = |poses: &Vec<Pose>| {
                 fit.match_last(context, poses);
-                let (before, written) = (poses.clone(), format!("{:?}", fit.correspondences()));
+                let (before, written) = (poses.clone(), format!("{:?}", fit.correspondences));
                 let cost = || Objective::new(context, fit.matched(poses), 1.0, None).body();
                 assert_eq!(cost().to_bits(), cost().to_bits(), "the cost of the same input must not change");
-                assert_eq!((&before, written), (poses, format!("{:?}", fit.correspondences())));
+                assert_eq!((&before, written), (poses, format!("{:?}", fit.correspondences)));
                 cost()
             };
             tried.iter().map(&mut cost).collect()

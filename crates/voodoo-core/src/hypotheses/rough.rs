@@ -22,7 +22,7 @@ pub(super) struct Extremity<'a> {
 
 impl<'a> Extremity<'a> {
     pub(super) fn new(context: Context<'a>, fit: &'a Fit, poses: &'a [Pose], chain: &'a TwoBone) -> Self {
-        let regions = context.compares_colors().then_some(fit.regions());
+        let regions = context.compares_colors().then_some(&fit.regions);
         Self { context, matched: fit.matched(poses), regions, chain }
     }
 

@@ -178,7 +178,7 @@ mod tests {
         with_context(pixels, &config, &model, &present, |context| {
             let mut fit = Fit::new(&config).unwrap();
             fit.match_last(context, &present);
-            let before = format!("{:?}", fit.correspondences());
+            let before = format!("{:?}", fit.correspondences);
             for status in [Status::Tracking, Status::Lost] {
                 relocalizer.observe(status, false, &present);
                 assert!(!relocalizer.search(context, &mut fit, &present));
@@ -186,7 +186,7 @@ mod tests {
             relocalizer.observe(Status::Lost, false, &present);
             let found = relocalizer.search(context, &mut fit, &present);
             let mut found = found.then(|| relocalizer.found().to_vec());
-            assert_eq!(format!("{:?}", fit.correspondences()), before);
+            assert_eq!(format!("{:?}", fit.correspondences), before);
             // Two more frames with the same image.
             for _ in 0..2 {
                 found.iter_mut().for_each(|poses| {

@@ -84,7 +84,8 @@ impl Trials {
         refill(poses, place.iter().copied());
         predicted.clone_from(poses);
         for step in 0..REFINE {
-            fit.step(context, predicted, poses, step);
+            fit.match_all(context, poses, step);
+            fit.solve(context, predicted, poses, step);
         }
         fit.match_all(context, poses, context.config.max_steps);
         Objective::new(context, fit.matched(poses), 1.0, None).body()

@@ -74,7 +74,7 @@ impl ColorGirths {
         for _ in 0..GIRTH_STEPS {
             fit.match_single_edges(setting.with_model(model), poses);
             for limb in 0..self.limbs.len() {
-                let edges = || edges_of(&fit.correspondences().regions, limb, poses[limb]);
+                let edges = || edges_of(&fit.correspondences.regions, limb, poses[limb]);
                 let part = &model.body.limbs()[limb];
                 if part.match_caps[1] {
                     let longer = tip(&part.shape, edges());
@@ -102,7 +102,7 @@ impl ColorGirths {
         }
         fit.match_single_edges(setting.with_model(model), poses);
         for limb in 0..self.limbs.len() {
-            let edges = edges_of(&fit.correspondences().regions, limb, poses[limb]);
+            let edges = edges_of(&fit.correspondences.regions, limb, poses[limb]);
             let system = system(&model.body.limbs()[limb].shape, edges);
             let Some(prior) = GirthPrior::of(&model.body, limb, &self.limbs) else { continue };
             let frames = f64::from(GIRTHS_EVERY);

@@ -174,7 +174,7 @@ impl Sizes {
                     let longer = 1.0 + (tip.reach - tip.rim) / shape.length();
                     model.body.change_tip(limb, longer.clamp(TIP_FACTORS[0], TIP_FACTORS[1]));
                 }
-                let matches = &fit.correspondences().limbs[limb];
+                let matches = &fit.correspondences.limbs[limb];
                 let Some(prior) = GirthPrior::of(&model.body, limb, &self.girths) else { continue };
                 let system = first_system(&shape, matches, &poses[limb], &edges_found);
                 let Some(step) = system.and_then(|system| self.girths[limb].start(&system, &prior, share)) else {
@@ -255,7 +255,7 @@ impl Sizes {
         for limb in (0..self.girths.len()).filter(|limb| relied_on(*limb)) {
             let Some(prior) = GirthPrior::of(&model.body, limb, &self.girths) else { continue };
             let shape = model.body.limbs()[limb].shape;
-            let (system, thickness) = side_system(&shape, fit.contours().sides(limb));
+            let (system, thickness) = side_system(&shape, fit.contours.sides(limb));
             if let Some(axes) = self.girths[limb].follow(&system, ASIDE_SIGMA, 1.0, thickness, &prior) {
                 model.body.change_girth(limb, Vec3::ZERO, axes);
             }
@@ -382,7 +382,7 @@ mod tests {
             with_setting(&pixels, &config, &model, &poses, |setting| {
                 fit.match_last(setting.with_model(&model), &poses)
             });
-            fit.correspondences().limbs[0].radius_variance.sqrt()
+            fit.correspondences.limbs[0].radius_variance.sqrt()
         };
         assert_eq!([Start::SizesKnown, Start::Positions].map(sigma), [0.0; 2]);
         let radius = 0.25 * model.body.limbs()[0].shape.ends().map(|end| end.a + end.b).iter().sum::<f64>();

@@ -53,7 +53,7 @@ impl BodyTracker {
 
     /// Stores color pictures of the empty scene for a color camera, each with its height and width. An empty slice removes them.
     pub fn set_background(&mut self, camera: u16, pictures: &[(ColorPixels, [usize; 2])]) -> Result<(), TrackError> {
-        self.fit.regions_mut().set_background(camera, pictures)
+        self.fit.regions.set_background(camera, pictures)
     }
 
     /// Updates the tracker after a change of the body, and closes the joints from the root outwards; orientations are kept.

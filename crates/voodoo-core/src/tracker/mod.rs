@@ -347,7 +347,7 @@ impl BodyTracker {
             return Err(TrackError::NotInitialized);
         }
         frame.check(&self.model.body, self.motion.stamp)?;
-        self.fit.regions().check(frame)
+        self.fit.regions.check(frame)
     }
 
     /// Whether the body explains the frame better at the current detection than where it is expected.
@@ -422,7 +422,7 @@ impl BodyTracker {
     fn report(&mut self, stamp: f64, steps: usize, time_scale: Option<f64>) {
         let Self { config, model, motion, observer, fit, hypotheses, sizes, assessor, uncertainty, estimate, .. } =
             self;
-        estimate.fill(&model.body, motion, fit.correspondences(), observer.candidates());
+        estimate.fill(&model.body, motion, &fit.correspondences, observer.candidates());
         (estimate.stamp, estimate.steps) = (stamp, steps);
         let Some(time_scale) = time_scale else {
             assessor.report_status(model, estimate);
@@ -431,7 +431,7 @@ impl BodyTracker {
             estimate.covariances.forget(&model.body);
             return;
         };
-        let (body, poses, correspondences) = (&model.body, &motion.poses, fit.correspondences());
+        let (body, poses, correspondences) = (&model.body, &motion.poses, &fit.correspondences);
         let (pairs, sizes_found) = (sizes.refined_pairs(), sizes.found_with_pose());
         let found = FittedPose { body, poses, correspondences, pairs, sizes_found, time_scale, config };
         let origin = motion.origin;

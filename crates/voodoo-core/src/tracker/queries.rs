@@ -29,7 +29,7 @@ fn passes_by(shape: &TaperedEllipticCylinder, [from, to]: [Vec3; 2]) -> bool {
 impl BodyTracker {
     /// Returns the lines along which the last step searched for color edges in a camera's picture.
     pub fn region_lines(&self, camera: u16) -> impl Iterator<Item = RegionLine> + '_ {
-        self.fit.regions().lines(camera)
+        self.fit.regions.lines(camera)
     }
 
     /// Returns the probability, 0 to 1, that each pixel of a frame's pictures shows the body, by the learned colors: picture
@@ -55,10 +55,10 @@ impl BodyTracker {
             return Err(TrackError::NotInitialized);
         }
         frame.check(&self.model.body, None)?;
-        self.fit.regions().check(frame)?;
+        self.fit.regions.check(frame)?;
         let current: Vec<Pose> = self.motion.world_from_limb().collect();
         let (body, previous, origin) = (&self.model.body, &[][..], Vec3::ZERO);
-        Ok(work(self.fit.regions_mut(), Posed { body, poses: poses.unwrap_or(&current), previous, origin }))
+        Ok(work(&mut self.fit.regions, Posed { body, poses: poses.unwrap_or(&current), previous, origin }))
     }
 
     /// Returns the body in its current sizes.

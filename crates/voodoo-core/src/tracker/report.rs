@@ -109,7 +109,7 @@ mod tests {
             let mut estimate = Estimate::default();
             // A second call replaces the results of the first.
             for _ in 0..2 {
-                estimate.fill(&model.body, &motion, fit.correspondences(), context.observation.candidates);
+                estimate.fill(&model.body, &motion, &fit.correspondences, context.observation.candidates);
             }
             (estimate, context.observation.candidates.len())
         })

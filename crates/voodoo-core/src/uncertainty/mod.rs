@@ -184,7 +184,7 @@ mod tests {
             let mut covariances = Covariances::default();
             (0..frames)
                 .map(|frame| {
-                    let correspondences = fit.correspondences();
+                    let correspondences = &fit.correspondences;
                     let (body, config) = (&model.body, &config);
                     let found = FittedPose {
                         body,
