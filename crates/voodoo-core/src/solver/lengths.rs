@@ -2,7 +2,7 @@
 
 use nalgebra::Vector6;
 
-use super::ChainSolver;
+use super::{ChainSolver, LENGTH_INFORMATION};
 use crate::body::kinematics::Chain;
 use crate::body::{Body, Pair};
 use crate::math::{Pose, Vec3, dot, factor, half_substitute, reset, solve_in_place};
@@ -19,14 +19,14 @@ pub(crate) struct Lengths {
 
 impl ChainSolver {
     /// Writes the relative change of length of each pair to `change`: the Gauss-Newton step of the lengths after elimination of
-    /// the pose unknowns (Schur complement), damped by `inertia` and pulled towards the initial value of `change` by `pull`.
+    /// the pose unknowns (Schur complement), damped, and pulled towards the initial value of `change` by `pull`.
     pub(crate) fn lengths(
         &mut self,
         body: &Body,
         normal: &NormalEquations,
         poses: &[Pose],
         pairs: &[Pair],
-        (inertia, pull): (f64, &[f64]),
+        pull: &[f64],
         change: &mut [f64],
         work: &mut Lengths,
     ) -> bool {
@@ -37,7 +37,7 @@ impl ChainSolver {
         }
         let count = pairs.len();
         for row in 0..count {
-            work.reduced[row * count + row] += inertia + pull[row];
+            work.reduced[row * count + row] += LENGTH_INFORMATION[0] + pull[row];
             change[row] = pull[row] * change[row] - work.gradient[row];
         }
         solve_in_place(&mut work.reduced, change, count)
@@ -54,7 +54,7 @@ fn slide(body: &Body, poses: &[Pose], limb: usize) -> Vector6<f64> {
 
 impl Lengths {
     /// Writes the information of the relative length of each of `pairs` on its own to `information`, with the pose unknowns
-    /// eliminated. Uses the factorization of [`ChainSolver::factor_information`].
+    /// eliminated. Uses the factorization of [`super::Spread::factor`].
     pub(crate) fn information(
         &mut self,
         solver: &ChainSolver,

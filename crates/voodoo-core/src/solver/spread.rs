@@ -7,73 +7,54 @@ use crate::body::Body;
 use crate::math::{Pose, Vec3, factor, refill};
 use crate::terms::normal_equations::{NormalEquations, line};
 
-/// Columns of the half-solved system, one row per unknown.
+/// Information of a body's limbs at some poses, and the covariances that follow from it.
 #[derive(Debug, Default)]
 pub(crate) struct Spread {
+    /// The normal equations of the limbs.
+    pub(crate) normal: NormalEquations,
+    /// Assembles and factors them.
+    pub(crate) system: ChainSolver,
+    /// Columns of the half-solved system, one row per unknown.
     rows: Vec<[f64; 6]>,
     /// Unknowns that move the queried limb, last one first.
     moving: Vec<usize>,
 }
 
-impl ChainSolver {
-    /// Assembles the limbs' information at `poses`, adds `own` to the diagonal, and factors the result for [`Spread`]. Returns
-    /// false when it is not positive definite.
-    pub(crate) fn factor_information(
-        &mut self,
-        body: &Body,
-        normal: &NormalEquations,
-        poses: &[Pose],
-        own: &[f64],
-    ) -> bool {
-        self.assemble(body, normal, poses, 0.0);
-        let n = self.chain.freedoms;
-        for (index, information) in own.iter().enumerate() {
-            self.h[index * n + index] += information;
-        }
-        factor(&mut self.h, n)
-    }
-
-    /// Adds the limbs' information to `known`, a lower triangle over all unknowns, and factors the sum for [`Spread`].
-    pub(crate) fn factor_added(
-        &mut self,
-        body: &Body,
-        normal: &NormalEquations,
-        poses: &[Pose],
-        known: &mut [f64],
-    ) -> bool {
-        self.assemble(body, normal, poses, 0.0);
-        known.iter_mut().zip(&self.h).for_each(|(known, added)| *known += added);
-        self.h.copy_from_slice(known);
-        factor(&mut self.h, self.chain.freedoms)
-    }
-}
-
 impl Spread {
+    /// Assembles the limbs' information at `poses`, lets `add` change its lower triangle over all unknowns, and factors the result.
+    /// Returns false when it is not positive definite.
+    pub(crate) fn factor(&mut self, body: &Body, poses: &[Pose], add: impl FnOnce(&mut [f64])) -> bool {
+        let Self { normal, system, .. } = self;
+        system.assemble(body, normal, poses, 0.0);
+        add(&mut system.h);
+        factor(&mut system.h, system.chain.freedoms)
+    }
+
     /// Covariance of a limb's pose about the `origin` of its frame: rotation in world axes (radians), then translation (meters).
-    pub(crate) fn of_limb(&mut self, solver: &ChainSolver, limb: usize, origin: Vec3) -> Matrix6<f64> {
-        self.list(solver, limb);
+    pub(crate) fn of_limb(&mut self, limb: usize, origin: Vec3) -> Matrix6<f64> {
+        self.list(limb);
         for unknown in &self.moving {
-            let screw = &solver.screws[*unknown];
+            let screw = &self.system.screws[*unknown];
             let row = &mut self.rows[*unknown];
             for axis in 0..3 {
                 row[axis] = screw[axis];
                 row[3 + axis] = line(origin, Vec3::AXES[axis]).dot(screw);
             }
         }
-        self.solve_half(solver);
+        self.solve_half();
         self.gram()
     }
 
     /// Covariance of the unknowns of a limb's own joint, in their order; for the root: of its rotation, then of its translation.
-    pub(crate) fn of_joint(&mut self, solver: &ChainSolver, limb: usize) -> Matrix6<f64> {
-        self.list(solver, limb);
+    pub(crate) fn of_joint(&mut self, limb: usize) -> Matrix6<f64> {
+        self.list(limb);
         for unknown in &self.moving {
             self.rows[*unknown] = [0.0; 6];
         }
-        for (own, unknown) in solver.chain.unknowns(limb).enumerate() {
+        for (own, unknown) in self.system.chain.unknowns(limb).enumerate() {
             self.rows[unknown][own] = 1.0;
         }
-        self.solve_half(solver);
+        self.solve_half();
         self.gram()
     }
 
@@ -92,17 +73,17 @@ impl Spread {
     }
 
     /// Lists the unknowns that move a limb.
-    fn list(&mut self, solver: &ChainSolver, limb: usize) {
-        let chain = &solver.chain;
+    fn list(&mut self, limb: usize) {
+        let chain = &self.system.chain;
         self.rows.resize(chain.freedoms, [0.0; 6]);
         refill(&mut self.moving, chain.up_from(limb).flat_map(|limb| chain.unknowns(limb).rev()));
     }
 
     /// Solves `L^T y = b` for six columns; with `H = L^T L`, `b^T H^-1 b = y^T y`. Only unknowns that move the limb take part.
-    fn solve_half(&mut self, solver: &ChainSolver) {
-        let n = solver.chain.freedoms;
+    fn solve_half(&mut self) {
+        let n = self.system.chain.freedoms;
         for (place, unknown) in self.moving.iter().enumerate() {
-            let l = &solver.h[unknown * n..unknown * n + unknown + 1];
+            let l = &self.system.h[unknown * n..unknown * n + unknown + 1];
             let row = self.rows[*unknown].map(|value| value / l[*unknown]);
             self.rows[*unknown] = row;
             for other in &self.moving[place + 1..] {
@@ -134,39 +115,38 @@ mod tests {
         let (model, poses) = standing();
         let (poses, _) = raised(&model, &poses, 0.3);
         let body = &model.body;
-        let mut normal = NormalEquations::default();
-        normal.clear(poses.len());
-        for (limb, own) in normal.limbs.iter_mut().enumerate() {
+        let mut spread = Spread::default();
+        spread.normal.clear(poses.len());
+        for (limb, own) in spread.normal.limbs.iter_mut().enumerate() {
             own.h = block(limb);
         }
-        let mut system = ChainSolver::default();
-        system.chain.layout(body);
-        let n = system.chain.freedoms;
+        spread.system.chain.layout(body);
+        let n = spread.system.chain.freedoms;
         let own: Vec<f64> = (0..n).map(|index| 1.0 + (index % 5) as f64).collect();
-        assert!(system.factor_information(body, &normal, &poses, &own));
+        let add = |h: &mut [f64]| h.iter_mut().step_by(n + 1).zip(&own).for_each(|(value, own)| *value += own);
+        assert!(spread.factor(body, &poses, add));
+        let ChainSolver { chain, screws, .. } = &spread.system;
         // The dense reference: every limb's twist as a matrix over all unknowns.
         let moves = |limb: usize, unknown: usize| {
             let mut ancestor = limb;
             loop {
-                let start = system.chain.start[ancestor];
-                if (start..start + system.chain.count[ancestor]).contains(&unknown) {
+                if chain.unknowns(ancestor).contains(&unknown) {
                     return true;
                 }
                 if ancestor == 0 {
                     return false;
                 }
-                ancestor = system.chain.parent[ancestor];
+                ancestor = chain.parent[ancestor];
             }
         };
-        let twist =
-            |limb: usize| DMatrix::from_fn(6, n, |row, k| if moves(limb, k) { system.screws[k][row] } else { 0.0 });
+        let twist = |limb: usize| DMatrix::from_fn(6, n, |row, k| if moves(limb, k) { screws[k][row] } else { 0.0 });
         let mut h = DMatrix::from_fn(n, n, |i, j| if i == j { own[i] + 1e-6 } else { 0.0 });
         for limb in 0..poses.len() {
             let j = twist(limb);
             h += j.transpose() * DMatrix::from_fn(6, 6, |i, j| block(limb)[(i, j)]) * &j;
         }
         let inverse = h.try_inverse().unwrap();
-        let mut spread = Spread::default();
+        let twists: Vec<DMatrix<f64>> = (0..poses.len()).map(twist).collect();
         for limb in 0..poses.len() {
             // Moved to the limb frame: its origin moves by `v + omega x origin`.
             let x = poses[limb].translation;
@@ -177,19 +157,19 @@ mod tests {
                     let (omega, v) = (Vec3::new(unit[0], unit[1], unit[2]), Vec3::new(unit[3], unit[4], unit[5]));
                     (v + omega.cross(x))[row - 3]
                 }
-            }) * twist(limb);
+            }) * &twists[limb];
             let dense = &at * &inverse * at.transpose();
-            let found = spread.of_limb(&system, limb, x);
+            let found = spread.of_limb(limb, x);
             let scale = dense.amax();
             for i in 0..6 {
                 for j in 0..6 {
                     assert!((found[(i, j)] - dense[(i, j)]).abs() < 1e-9 * scale, "limb {limb}: {i}, {j}");
                 }
             }
-            let (start, joint) = (system.chain.start[limb], spread.of_joint(&system, limb));
-            for i in 0..system.chain.count[limb] {
-                for j in 0..system.chain.count[limb] {
-                    let dense = inverse[(start + i, start + j)];
+            let (joint, own) = (spread.of_joint(limb), spread.system.chain.unknowns(limb));
+            for i in 0..own.len() {
+                for j in 0..own.len() {
+                    let dense = inverse[(own.start + i, own.start + j)];
                     assert!((joint[(i, j)] - dense).abs() < 1e-9 * inverse.amax(), "joint {limb}: {i}, {j}");
                 }
             }

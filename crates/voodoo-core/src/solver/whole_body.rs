@@ -83,7 +83,7 @@ impl Solver for WholeBody {
     fn lengths(&mut self, problem: &Problem, poses: &[Pose], pairs: &[Pair], pull: &[f64], change: &mut [f64]) -> bool {
         self.sum_terms(problem, poses, false);
         let Self { normal, chain, lengths, .. } = self;
-        chain.lengths(problem.body, normal, poses, pairs, (LENGTH_INFORMATION[0], pull), change, lengths)
+        chain.lengths(problem.body, normal, poses, pairs, pull, change, lengths)
     }
 
     fn prepare(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {

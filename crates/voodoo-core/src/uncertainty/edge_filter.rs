@@ -11,8 +11,7 @@ use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Model};
 use crate::config::Config;
 use crate::math::{Pose, Vec3, factor, refill, reset};
-use crate::solver::{ChainSolver, SITE_SCALE, Spread};
-use crate::terms::normal_equations::NormalEquations;
+use crate::solver::{SITE_SCALE, Spread};
 use crate::terms::{Regions, Sites, Term};
 
 /// Standard deviation of every unknown of a pose that the user set, radians and meters.
@@ -25,8 +24,6 @@ const MIN_WEIGHT: f64 = 1e-3;
 /// Estimate of the uncertainty of a pose, updated from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct EdgeFilter {
-    normal: NormalEquations,
-    system: ChainSolver,
     spread: Spread,
     /// Information of all unknowns after the last frame, lower triangle.
     known: Vec<f64>,
@@ -62,15 +59,19 @@ impl EdgeFilter {
         let body = &model.body;
         self.expect(body, time_scale);
         self.sum_terms(model, poses, correspondences, config);
-        let Self { normal, system, spread, known, sigma, .. } = self;
+        let Self { spread, known, sigma, .. } = self;
         sigma.clear();
-        if !system.factor_added(body, normal, poses, known) {
+        let add = |h: &mut [f64]| {
+            known.iter_mut().zip(&*h).for_each(|(known, added)| *known += added);
+            h.copy_from_slice(known);
+        };
+        if !spread.factor(body, poses, add) {
             know_alone(known, self.still.len(), MAX_SIGMA);
             return;
         }
         for (limb, part) in body.limbs().iter().enumerate() {
             let end = poses[limb] * (part.shape.length() * Vec3::Z);
-            let end = spread.of_limb(system, limb, end);
+            let end = spread.of_limb(limb, end);
             sigma.push((3..6).map(|axis| end[(axis, axis)]).sum::<f64>().sqrt());
         }
     }
@@ -115,7 +116,7 @@ impl EdgeFilter {
 
     /// Adds the frame's information on every limb, weighted by how strongly the limb is supported.
     fn sum_terms(&mut self, model: &Model, poses: &[Pose], correspondences: &Correspondences, config: &Config) {
-        let (normal, Model { body, extremities, .. }) = (&mut self.normal, model);
+        let (normal, Model { body, extremities, .. }) = (&mut self.spread.normal, model);
         normal.clear(poses.len());
         Regions { pairs: &correspondences.regions, colors: None }.add(body, poses, normal);
         for (limb, block) in normal.limbs.iter_mut().enumerate() {

@@ -18,8 +18,7 @@ use crate::body::{Body, Pair};
 use crate::config::Config;
 use crate::math::{Pose, Vec3};
 use crate::sizes::girth::ALIKE;
-use crate::solver::{ChainSolver, LENGTH_INFORMATION, Lengths, SITE_SCALE, Spread};
-use crate::terms::normal_equations::NormalEquations;
+use crate::solver::{LENGTH_INFORMATION, Lengths, SITE_SCALE, Spread};
 use crate::terms::{Measurements, Term};
 
 /// Maximum number of surface points per meter of limb with independent errors.
@@ -38,8 +37,6 @@ const SITE_SIGMA: [f64; 2] = [0.01, 0.015];
 /// Estimate of the uncertainty of a pose, updated from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct Uncertainty {
-    normal: NormalEquations,
-    system: ChainSolver,
     spread: Spread,
     /// Variance of every unknown after the last frame.
     variance: Vec<f64>,
@@ -85,21 +82,23 @@ impl Uncertainty {
     ) {
         self.expect(found);
         self.sum_terms(found, proven);
-        let Self { normal, system, spread, variance, information, .. } = self;
+        let Self { spread, variance, information, .. } = self;
         covariances.forget(found.body);
-        if !system.factor_information(found.body, normal, found.poses, information) {
+        let step = information.len() + 1;
+        let add = |h: &mut [f64]| h.iter_mut().step_by(step).zip(&*information).for_each(|(value, own)| *value += own);
+        if !spread.factor(found.body, found.poses, add) {
             return;
         }
         variance.clear();
         for (limb, part) in found.body.limbs().iter().enumerate() {
-            let own = spread.of_joint(system, limb);
+            let own = spread.of_joint(limb);
             variance.extend((0..freedoms(part)).map(|index| own[(index, index)]));
             let axes = part
                 .parent
                 .as_ref()
                 .map_or([Vec3::X, Vec3::Y, Vec3::Z], |(parent, joint)| joint_axes(joint, &found.poses[*parent]).0);
             covariances.set_turn(limb, &own, axes);
-            let covariance = spread.of_limb(system, limb, found.poses[limb].translation);
+            let covariance = spread.of_limb(limb, found.poses[limb].translation);
             covariances.set_limb(limb, &covariance, SITE_SIGMA[usize::from(found.sizes_found)]);
         }
         for (index, site) in found.body.sites().iter().enumerate() {
@@ -115,8 +114,8 @@ impl Uncertainty {
 
     /// Adds the frame's information on the limbs' lengths; errors of successive frames are correlated.
     fn learn_lengths(&mut self, found: FittedPose) {
-        let Self { system, known, length_information, work, .. } = self;
-        work.information(system, found.body, found.poses, found.pairs, length_information);
+        let Self { spread, known, length_information, work, .. } = self;
+        work.information(&spread.system, found.body, found.poses, found.pairs, length_information);
         known.resize(found.pairs.len(), LENGTH_INFORMATION[1]);
         for (known, length_information) in known.iter_mut().zip(length_information) {
             *known += *length_information / ALIKE;
@@ -148,10 +147,11 @@ impl Uncertainty {
     /// Returns the frame's information on every limb, limited to the number of independent measurements.
     fn sum_terms(&mut self, found: FittedPose, proven: impl Fn(usize) -> bool) {
         let FittedPose { body, poses, correspondences, config, .. } = found;
-        self.normal.clear(poses.len());
+        let normal = &mut self.spread.normal;
+        normal.clear(poses.len());
         let measurements = Measurements::new(correspondences, config, config.kernel_end, SITE_SCALE, true);
-        measurements.add(body, poses, &mut self.normal);
-        for (limb, block) in self.normal.limbs.iter_mut().enumerate() {
+        measurements.add(body, poses, normal);
+        for (limb, block) in normal.limbs.iter_mut().enumerate() {
             let most = PATCHES_PER_METER * body.limbs()[limb].shape.length();
             let lines = correspondences.regions.iter().filter(|pair| pair.limb == limb).count();
             let alike = most / (most + correspondences.measured_weight(limb) + lines as f64);
