@@ -1,6 +1,8 @@
 //! Solves for all limbs at once with elastic bands (K07 section 4). Every limb has a twist of its own. The normal matrix has the
 //! structure of the body's tree, so elimination from the leaves to the root takes time linear in the number of limbs.
 
+use std::ops::{AddAssign, SubAssign};
+
 use nalgebra::{Cholesky, Matrix6, Vector6};
 
 use super::{DAMPING, FLOOR, LARGEST_TURN};
@@ -79,15 +81,12 @@ impl TreeSolver {
     /// Adds the normal equations of the joint's relative rotation `omega_child - omega_parent`.
     fn add_turn(&mut self, [child, parent]: [usize; 2], normal: &NormalEquations) {
         let joint = &normal.joints[child];
-        for i in 0..3 {
-            self.own[child].g[i] += joint.g[i];
-            self.own[parent].g[i] -= joint.g[i];
-            for j in 0..3 {
-                self.own[child].h[(i, j)] += joint.h[(i, j)];
-                self.own[parent].h[(i, j)] += joint.h[(i, j)];
-                self.mixed[child][(i, j)] -= joint.h[(i, j)];
-            }
+        self.own[child].g.fixed_rows_mut::<3>(0).add_assign(&joint.g);
+        self.own[parent].g.fixed_rows_mut::<3>(0).sub_assign(&joint.g);
+        for limb in [child, parent] {
+            self.own[limb].h.fixed_view_mut::<3, 3>(0, 0).add_assign(&joint.h);
         }
+        self.mixed[child].fixed_view_mut::<3, 3>(0, 0).sub_assign(&joint.h);
     }
 
     /// Eliminates every limb into its parent, leaves first, then computes the twists from the root on. Returns false, with
