@@ -3,10 +3,10 @@
 use std::f64::consts::TAU;
 
 use super::objective::Objective;
-use super::rough_points::{ROUGH_SAMPLE, bounds, explain, may_explain, rough_cost};
+use super::rough_points::{ROUGH_SAMPLE, explain, may_explain, rough_cost};
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Fit, Matched};
-use crate::math::{Pose, Vec3, WeightedPoints, make_room, refill, reset};
+use crate::math::{Aabb, Pose, Vec3, WeightedPoints, make_room, refill, reset};
 use crate::regions::ColorRegions;
 
 /// The arm or leg under test, and the current poses of the body.
@@ -78,7 +78,8 @@ impl RoughSearch {
         }
         sample.subsample(ROUGH_SAMPLE);
         reset(others, sample.len(), f32::INFINITY);
-        let (body, poses, bounds) = (&at.context.model.body, at.matched.poses, bounds(&sample.points));
+        let (body, poses) = (&at.context.model.body, at.matched.poses);
+        let bounds = Aabb::from_points((0..sample.len()).map(|index| sample.points.get(index)));
         for limb in (0..poses.len()).filter(|limb| at.chain.limbs().all(|own| own != *limb)) {
             // Most limbs are too far away to explain any point.
             if may_explain(&body.limbs()[limb].shape, &poses[limb], bounds) {

@@ -1,7 +1,7 @@
 //! Points at the poses of a rough hypothesis: their distances from limbs, without associating them.
 
 use crate::body::Body;
-use crate::math::{Points, Pose, Vec3};
+use crate::math::{Aabb, Points, Pose};
 use crate::shape::TaperedEllipticCylinder;
 use crate::terms::unexplained;
 use crate::visibility::EXPLAINED;
@@ -26,20 +26,10 @@ pub(crate) fn explain(
     }
 }
 
-/// Bounding box of points: its lowest and highest corner.
-pub(super) fn bounds(points: &Points) -> [Vec3; 2] {
-    let least =
-        |values: &[f32]| values.iter().fold(f32::INFINITY, |least, value| if *value < least { *value } else { least });
-    let most =
-        |values: &[f32]| values.iter().fold(f32::NEG_INFINITY, |most, value| if *value > most { *value } else { most });
-    let Points { x, y, z } = points;
-    [[least(x), least(y), least(z)], [most(x), most(y), most(z)]].map(|corner| Vec3::from_array(corner.map(f64::from)))
-}
-
 /// Whether a limb may explain a point within a bounding box, with the tolerance of the rough cost.
-pub(super) fn may_explain(shape: &TaperedEllipticCylinder, pose: &Pose, [low, high]: [Vec3; 2]) -> bool {
+pub(super) fn may_explain(shape: &TaperedEllipticCylinder, pose: &Pose, bounds: Aabb) -> bool {
     let (middle, radius) = shape.sphere(pose);
-    let gap = (middle - middle.max(low).min(high)).length() - radius;
+    let gap = (middle - middle.max(bounds.mins).min(bounds.maxs)).length() - radius;
     // The approximate distance is smaller than the true one where a cross-section is flat.
     let flatness = |a: f64, b: f64| a.min(b) / a.max(b).max(f64::MIN_POSITIVE);
     gap * flatness(shape.a0(), shape.b0()).min(flatness(shape.a1(), shape.b1())) <= TOLERANCE * EXPLAINED
