@@ -72,9 +72,7 @@ impl BodyTracker {
     /// # Errors
     /// [`TrackError::NotInitialized`] without a pose.
     pub fn expected_sites(&self, stamp: f64) -> Result<Vec<Vec3>, TrackError> {
-        if !self.is_started() {
-            return Err(TrackError::NotInitialized);
-        }
+        self.started()?;
         let sites = &self.estimate.sites;
         let Some(LimbMotion { interval, .. }) = self.limb_motion() else { return Ok(sites.clone()) };
         let elapsed = self.config.prediction * (stamp - self.estimate.stamp);

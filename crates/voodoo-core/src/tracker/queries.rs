@@ -51,8 +51,8 @@ impl BodyTracker {
         poses: Option<&[Pose]>,
         work: impl FnOnce(&mut ColorRegions, Posed) -> R,
     ) -> Result<R, TrackError> {
-        if poses.is_none() && !self.is_started() {
-            return Err(TrackError::NotInitialized);
+        if poses.is_none() {
+            self.started()?;
         }
         frame.check(&self.model.body, None)?;
         self.fit.regions.check(frame)?;
@@ -89,6 +89,11 @@ impl BodyTracker {
     /// Whether the tracker has a pose.
     pub(super) fn is_started(&self) -> bool {
         !self.motion.poses.is_empty()
+    }
+
+    /// Returns an error without a pose.
+    pub(super) fn started(&self) -> Result<(), TrackError> {
+        if self.is_started() { Ok(()) } else { Err(TrackError::NotInitialized) }
     }
 
     /// Returns the signed distances of world points to the surface of every limb, meters, negative inside: one vector for each
@@ -136,9 +141,7 @@ impl BodyTracker {
     /// Returns for each site position the length of the line of sight, towards the camera's focal point, that lies inside the
     /// posed body; world frame, meters. Where the body occludes a joint, a network guesses its position with no less confidence.
     pub fn body_before(&self, sites: &[Vec3], camera: Vec3) -> Result<Vec<f64>, TrackError> {
-        if !self.is_started() {
-            return Err(TrackError::NotInitialized);
-        }
+        self.started()?;
         let poses: Vec<Pose> = self.motion.world_from_limb().map(|pose| pose.inverse()).collect();
         let limbs = || self.model.body.limbs().iter().zip(&poses);
         let hidden = |site: &Vec3| {
@@ -164,9 +167,7 @@ impl BodyTracker {
 
     /// Returns world points in the working frame of the posed body.
     fn queries(&self, points: PointSlice) -> Result<Points, TrackError> {
-        if !self.is_started() {
-            return Err(TrackError::NotInitialized);
-        }
+        self.started()?;
         let mut queries = Points::default();
         for index in 0..points.len() {
             let point = points.get(index);
