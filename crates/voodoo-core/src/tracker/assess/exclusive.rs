@@ -17,44 +17,20 @@ pub(super) struct Exclusive {
     distances: Vec<f32>,
     /// Distances of all sample points, limb after limb.
     all: Vec<f32>,
-    nearest: SampleNearest,
-}
-
-/// For each sample point the nearest limb, the distance to it, and the number of limbs near enough to explain the point.
-#[derive(Debug, Default)]
-struct SampleNearest {
-    limb: Vec<u32>,
-    distance: Vec<f32>,
+    /// For each sample point the nearest limb, the distance to it, and the number of limbs near enough to explain the point.
+    nearest: Vec<u32>,
+    least: Vec<f32>,
     near: Vec<u32>,
-}
-
-impl SampleNearest {
-    /// Updates the arrays with the distances of all sample points to one limb.
-    fn offer(&mut self, limb: u32, distances: &[f32]) {
-        let own = self.limb.iter_mut().zip(&mut self.distance).zip(&mut self.near);
-        widest(
-            #[inline(always)]
-            || {
-                for (((nearest, least), near), distance) in own.zip(distances) {
-                    let nearer = *distance < *least;
-                    *nearest = if nearer { limb } else { *nearest };
-                    *least = if nearer { *distance } else { *least };
-                    *near += u32::from(*distance <= EXPLAINED as f32);
-                }
-            },
-        );
-    }
 }
 
 impl Exclusive {
     /// Recomputes the weights for these poses and candidates.
     pub(super) fn count(&mut self, body: &Body, poses: &[Pose], candidates: &Candidates) {
-        let Self { weight, clouds, sample, distances, all, nearest } = self;
+        let Self { weight, clouds, sample, distances, all, nearest, least, near } = self;
         let count = poses.len();
         let pixels = candidates.cameras.last().map_or(0, |(end, _)| *end as usize);
-        for counts in [&mut *weight, &mut *clouds] {
-            reset(counts, count, 0.0);
-        }
+        reset(weight, count, 0.0);
+        reset(clouds, count, 0.0);
         let step = (candidates.len() / ROUGH_SAMPLE).max(1);
         let points = &candidates.points;
         sample.clear();
@@ -62,26 +38,36 @@ impl Exclusive {
             sample.push([points.x[index], points.y[index], points.z[index]]);
         }
         all.clear();
-        reset(&mut nearest.distance, sample.len(), f32::INFINITY);
-        for numbers in [&mut nearest.limb, &mut nearest.near] {
-            reset(numbers, sample.len(), 0);
-        }
+        reset(least, sample.len(), f32::INFINITY);
+        reset(nearest, sample.len(), 0);
+        reset(near, sample.len(), 0);
         for (index, (limb, pose)) in (0..).zip(body.limbs().iter().zip(poses)) {
             limb.shape.approximate_distances(pose, sample, distances);
             distances.iter_mut().for_each(|distance| *distance = distance.abs());
-            nearest.offer(index, distances);
+            let own = nearest.iter_mut().zip(&mut *least).zip(&mut *near).zip(&*distances);
+            widest(
+                #[inline(always)]
+                || {
+                    for (((nearest, least), near), distance) in own {
+                        let nearer = *distance < *least;
+                        *nearest = if nearer { index } else { *nearest };
+                        *least = if nearer { *distance } else { *least };
+                        *near += u32::from(*distance <= EXPLAINED as f32);
+                    }
+                },
+            );
             all.extend_from_slice(distances);
         }
         for place in 0..sample.len() {
-            if nearest.distance[place] >= EXPLAINED as f32 {
+            if least[place] >= EXPLAINED as f32 {
                 continue;
             }
-            let closest = nearest.limb[place] as usize;
+            let closest = nearest[place] as usize;
             let distance = |limb: usize| all[limb * sample.len() + place];
             let rival = |other: &usize| {
                 *other != closest && distance(*other) <= EXPLAINED as f32 && !body.adjacent(*other, closest)
             };
-            if nearest.near[place] == 1 || (0..count).find(rival).is_none() {
+            if near[place] == 1 || (0..count).find(rival).is_none() {
                 let candidate = f64::from(candidates.weight[place * step]) * step as f64;
                 weight[closest] += candidate;
                 clouds[closest] += if place * step < pixels { 0.0 } else { candidate };
