@@ -4,28 +4,10 @@ use super::{Context, Fit};
 use crate::math::Pose;
 
 impl Fit {
-    /// Learns the colors in new cameras at the predicted pose.
-    pub(crate) fn begin_regions(&mut self, context: Context, poses: &[Pose]) {
-        if context.config.regions {
-            self.regions.begin(context.observation.frame(), context.posed(poses));
-        }
-    }
-
     /// Searches for every color edge separately on both sides of a limb: the pairs determine its width.
     pub(crate) fn match_single_edges(&mut self, context: Context, poses: &[Pose]) {
-        let Self { regions, correspondences, .. } = self;
-        correspondences.regions.clear();
-        if context.config.regions {
-            let (frame, posed) = (context.observation.frame(), context.posed(poses));
-            regions.find_single_edges(frame, posed, &mut correspondences.regions);
-        }
-    }
-
-    /// Learns colors at the fitted pose.
-    pub(crate) fn learn_regions(&mut self, context: Context) {
-        if context.config.regions {
-            self.regions.learn(context.observation.frame());
-        }
+        let (frame, posed) = (context.observation.frame(), context.posed(poses));
+        self.regions.find_single_edges(frame, posed, &mut self.correspondences.regions);
     }
 
     pub(super) fn find_regions(&mut self, context: Context, poses: &[Pose], step: usize) {
@@ -33,7 +15,7 @@ impl Fit {
         correspondences.regions.clear();
         correspondences.region_support.clear();
         let frame = context.observation.frame();
-        if context.config.regions && !frame.colors.is_empty() {
+        if !frame.colors.is_empty() {
             regions.find(frame, context.posed(poses), step, |limb| context.uses_edges(limb), correspondences);
         }
     }

@@ -19,7 +19,7 @@ const LOOSER: f64 = 3.0;
 
 /// The second branch of the body.
 #[derive(Debug, Default)]
-pub(super) struct Branch {
+pub(crate) struct Branch {
     /// Its poses and their prediction, world frame. Without poses there is no second branch.
     pub(super) motion: Motion,
     /// Its poses in this frame, their prediction and the previous ones, and the body with one arm or leg of the branch; working
@@ -31,9 +31,9 @@ pub(super) struct Branch {
 }
 
 impl Branch {
-    /// Fits the second branch to a frame, before the body itself is fitted. Afterwards, `fit` holds its correspondences. Returns
+    /// Fits the second branch to a frame of few color images, before the body itself is fitted. Afterwards, `fit` holds its correspondences. Returns
     /// the number of ICP steps.
-    pub(super) fn follow(&mut self, context: Context, fit: &mut Fit) -> usize {
+    pub(crate) fn follow(&mut self, context: Context, fit: &mut Fit) -> usize {
         let Self { motion, poses, predicted, previous, .. } = self;
         if !is_enabled(context) || motion.poses.len() != context.model.body.limbs().len() {
             motion.poses.clear();
@@ -99,7 +99,7 @@ impl Branch {
 
     /// Distance between the distal end of a limb of the body, posed in the world frame, and that of the branch, meters; `None`
     /// without a branch.
-    pub(super) fn end_distance(&self, limb: usize, length: f64, world_from_limb: &Pose) -> Option<f64> {
+    pub(crate) fn end_distance(&self, limb: usize, length: f64, world_from_limb: &Pose) -> Option<f64> {
         let end = length * Vec3::Z;
         self.motion.poses.get(limb).map(|own| (*own * end).distance(*world_from_limb * end))
     }

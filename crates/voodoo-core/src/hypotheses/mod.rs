@@ -15,7 +15,7 @@ pub(crate) use refined::REFINE;
 pub(crate) use rough_points::{ROUGH_SAMPLE, explain};
 
 use crate::association::correspondence::RegionSupport;
-use crate::body::{Body, Model};
+use crate::body::Model;
 use crate::detect::Detected;
 use crate::fit::{Context, Fit, Motion};
 use crate::math::{Pose, make_room};
@@ -39,7 +39,8 @@ pub(crate) struct Hypotheses {
     color_directions: ColorDirections,
     pool: Pool,
     refined: Refined,
-    branch: Branch,
+    /// The second branch of the body, fitted to the same color images.
+    pub(crate) branch: Branch,
     /// The poses before this frame's hypotheses.
     before: Vec<Pose>,
 }
@@ -52,11 +53,6 @@ impl Hypotheses {
         self.before.clear();
     }
 
-    /// Fits the second branch to a frame of few color images, before the body itself is fitted. Returns the number of ICP steps.
-    pub(crate) fn follow_branch(&mut self, context: Context, fit: &mut Fit) -> usize {
-        self.branch.follow(context, fit)
-    }
-
     /// Whether the body left more of the last frame unexplained than is usual.
     pub(crate) fn has_excess(&self) -> bool {
         self.unexplained.clutter < 1.0
@@ -65,12 +61,6 @@ impl Hypotheses {
     /// Whether it left clearly more.
     pub(crate) fn unlike(&self) -> bool {
         self.unexplained.clutter < UNLIKE_FRAME
-    }
-
-    /// Distance between the distal end of a limb of the body, posed in the world frame, and that of the second branch, meters;
-    /// `None` without a second branch.
-    pub(crate) fn branch_distance(&self, body: &Body, limb: usize, world_from_limb: &Pose) -> Option<f64> {
-        self.branch.end_distance(limb, body.limbs()[limb].shape.length(), world_from_limb)
     }
 
     /// Tests every arm and leg. Where the frame contradicts one, proposes and refines alternatives, and accepts one that explains

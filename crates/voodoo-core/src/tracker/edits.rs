@@ -70,7 +70,7 @@ impl BodyTracker {
         fit.clear();
         sizes.edited(model, relocalizer.detector.map());
         relocalizer.restart(model, &motion.poses);
-        assessor.edited(estimate.status);
+        assessor.restart(estimate.status);
         self.report(self.motion.stamp.unwrap_or(f64::NAN), 0, None);
     }
 }

@@ -13,7 +13,7 @@ use crate::detect::{Detect, DetectError, Detected, PlacedDetection};
 use crate::error::TrackError;
 use crate::fit::{Fit, Motion, Setting};
 use crate::hypotheses::Hypotheses;
-use crate::math::{Pose, Vec3, is_rigid, refill, shifted};
+use crate::math::{Pose, Vec3, is_rigid, refill};
 use crate::observation::candidates::body_box;
 use crate::observation::frame::Frame;
 use crate::observation::observer::{Observer, Own};
@@ -144,7 +144,9 @@ impl BodyTracker {
         if self.is_started() {
             self.before.keep(&self.estimate);
             // Where the ground plane is not given, the one that the detector found under the body is used.
-            let frame = &Frame { ground: frame.ground.or(self.relocalizer.floor), ..*frame };
+            let ground = frame.ground.or(self.relocalizer.floor);
+            let colors = if self.config.regions { frame.colors } else { &[] };
+            let frame = &Frame { ground, colors, ..*frame };
             self.relocate(frame, ownership);
             self.track(frame, ownership);
         }
@@ -245,15 +247,15 @@ impl BodyTracker {
         }
         let origin = motion.origin;
         let root = origin + motion.expect(&model.body, frame.stamp, config.prediction)[0].translation;
-        let suspect = hypotheses.has_excess() || assessor.has_suspect_limb();
+        let suspect = hypotheses.has_excess() || sizes.is_uncertain();
         let reasons = Reasons {
-            uncertain: suspect || assessor.is_uncertain(&model.extremities) || sizes.is_uncertain(),
+            uncertain: suspect || assessor.is_uncertain(&model.extremities),
             anywhere: interrupted,
             // Beside other persons, what the body does not explain may be theirs.
             unlike: ownership.others == 0 && hypotheses.unlike(),
         };
         // A lost body is searched for with everybody's detections, see `crate::People`.
-        if assessor.status() == Status::Lost {
+        if assessor.status == Status::Lost {
             relocalizer.forget();
         } else {
             relocalizer.detect(&model.body, frame, ownership, root, reasons);
@@ -307,9 +309,9 @@ impl BodyTracker {
         sizes.set_radius_sigmas(&model.body, fit);
         // Sizes from the first frame, then warm start and ICP steps (steps 2 to 7).
         let mut steps = 0;
-        fit.begin_regions(setting.with_model(model), poses);
+        fit.regions.begin(frame, setting.with_model(model).posed(poses));
         if config.hypotheses && whole_body && known {
-            steps += hypotheses.follow_branch(setting.with_model(model), fit);
+            steps += hypotheses.branch.follow(setting.with_model(model), fit);
         }
         if sizes.wait_for_pose() {
             steps += fit.run(setting.with_model(model), predicted, poses);
@@ -317,19 +319,21 @@ impl BodyTracker {
         sizes.initialize(setting, model, poses, fit);
         steps += fit.run(setting.with_model(model), predicted, poses);
         // Alternative hypotheses for arms and legs.
-        if config.hypotheses && whole_body && known && assessor.status() != Status::Lost {
+        if config.hypotheses && whole_body && known && assessor.status != Status::Lost {
             steps += hypotheses.improve(setting.with_model(model), fit, poses, predicted, relocalizer.detected());
         }
         // Refinement of the sizes with this frame.
-        let lost = assessor.status() == Status::Lost;
+        let lost = assessor.status == Status::Lost;
         let reliance = Reliance { lost, girths: whole_body, limb: |limb| assessor.is_reliable(limb) };
         sizes.refine(setting, model, poses, predicted, fit, reliance);
         // Assessment: status of the body and its limbs.
         assessor.assess(setting.with_model(model), fit.matched(poses), relocalizer.detected());
-        fit.learn_regions(setting.with_model(model));
+        if config.regions {
+            fit.regions.learn(frame);
+        }
         hypotheses.forget_motion(model, motion);
         motion.commit(frame.stamp);
-        self.relocalizer.observe(self.assessor.status(), self.observer.silent(frame), &self.motion.poses);
+        self.relocalizer.observe(self.assessor.status, self.observer.silent(frame), &self.motion.poses);
         self.report(frame.stamp, steps, Some(time_scale));
         if self.relocalizer.is_false_track() {
             self.stop(frame.stamp);
@@ -358,7 +362,7 @@ impl BodyTracker {
         let observation = observer.observation(frame, motion.origin, ownership);
         let previous = if motion.stamp.is_some() { &motion.poses[..] } else { &[] };
         let setting = Setting { config, observation, previous, time_scale: 1.0 };
-        let lost = assessor.status() == Status::Lost;
+        let lost = assessor.status == Status::Lost;
         fit.forget_detected();
         let is_there = relocalizer.try_detected(setting.with_model(model), fit, &motion.predicted, lost);
         if is_there {
@@ -389,7 +393,7 @@ impl BodyTracker {
         predicted.clone_from(poses);
         poses.clone_from_slice(self.relocalizer.found());
         self.reassess(frame, ownership);
-        if self.assessor.status() != Status::Lost {
+        if self.assessor.status != Status::Lost {
             self.motion.forget();
             return true;
         }
@@ -434,8 +438,10 @@ impl BodyTracker {
         let (body, poses, correspondences) = (&model.body, &motion.poses, &fit.correspondences);
         let (pairs, sizes_found) = (sizes.refined_pairs(), sizes.found_with_pose());
         let found = FittedPose { body, poses, correspondences, pairs, sizes_found, time_scale, config };
-        let origin = motion.origin;
-        let branch_distance = |limb: usize| hypotheses.branch_distance(body, limb, &shifted(&poses[limb], -origin));
+        let branch_distance = |limb: usize| {
+            let length = body.limbs()[limb].shape.length();
+            hypotheses.branch.end_distance(limb, length, &estimate.world_from_limb[limb])
+        };
         assessor.follow_edges(model, found, branch_distance);
         assessor.report_status(model, estimate);
         let Estimate { limb_status, covariances, .. } = estimate;

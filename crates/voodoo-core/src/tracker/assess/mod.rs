@@ -61,7 +61,7 @@ pub(super) struct Assessor {
     /// Sums of the roundness of the surface observed at the tracked pose.
     round: [f64; 2],
     /// Internal status of the body and of its limbs, which the tracker itself uses; `internal` is empty before the first frame.
-    status: Status,
+    pub(super) status: Status,
     internal: Vec<LimbStatus>,
     /// Log odds that each limb is right, of which its reported status and probability are functions.
     log_odds: Vec<f64>,
@@ -78,14 +78,14 @@ pub(super) struct Assessor {
 impl Assessor {
     /// Trusts a pose that the user set: it counts as right until many frames contradict it.
     pub(super) fn trust_pose(&mut self) {
-        self.forget_limbs();
-        self.status = Status::Tracking;
+        self.restart(Status::Tracking);
         self.round = [ROUND[0]; 2];
     }
 
-    /// Restarts the assessment after an edit of the limbs; the body keeps the reported `status`.
-    pub(super) fn edited(&mut self, status: Status) {
-        self.forget_limbs();
+    /// Restarts the assessment of the limbs, of a body with this status.
+    pub(super) fn restart(&mut self, status: Status) {
+        self.limbs.clear();
+        self.internal.clear();
         self.status = status;
     }
 
@@ -95,11 +95,6 @@ impl Assessor {
         self.round = [ROUND[1]; 2];
     }
 
-    /// Whether the last assessment found the body not tracked or one of its limbs lost.
-    pub(super) fn has_suspect_limb(&self) -> bool {
-        self.status != Status::Tracking || self.internal.contains(&LimbStatus::Lost)
-    }
-
     /// Sets the body and all its limbs to lost.
     fn give_up(&mut self) {
         self.status = Status::Lost;
@@ -107,15 +102,13 @@ impl Assessor {
         self.log_odds.fill(f64::NEG_INFINITY);
     }
 
-    /// Internal status of the body, which the tracker itself uses.
-    pub(super) fn status(&self) -> Status {
-        self.status
-    }
-
-    /// Whether the status of an arm or leg has low confidence.
+    /// Whether the last assessment found the body not tracked or one of its limbs lost, or whether the status of an arm or leg has
+    /// low confidence.
     pub(super) fn is_uncertain(&self, extremities: &[TwoBone]) -> bool {
-        let limbs = extremities.iter().flat_map(|chain| [chain.upper, chain.lower]);
-        limbs.filter_map(|limb| self.limbs.get(limb)).any(LimbFilter::is_uncertain)
+        let mut limbs = extremities.iter().flat_map(|chain| [chain.upper, chain.lower]);
+        self.status != Status::Tracking
+            || self.internal.contains(&LimbStatus::Lost)
+            || limbs.any(|limb| self.limbs.get(limb).is_some_and(LimbFilter::is_uncertain))
     }
 
     /// Whether the tracker relies on a limb: its internal status is measured.
@@ -174,11 +167,6 @@ impl Assessor {
             || !sources.is_empty() && sources.iter().all(|source| source.inliers == 0);
         let doubtful = missed || measured_fraction(statuses) < 1.0 - SOME;
         estimate.status = if status == Status::Tracking && doubtful { Status::Degraded } else { status };
-    }
-
-    fn forget_limbs(&mut self) {
-        self.limbs.clear();
-        self.internal.clear();
     }
 
     /// Updates the filter of every limb with this frame.
@@ -339,7 +327,7 @@ mod tests {
         let mut assessor = trusting();
         assess_frames(&mut assessor, &before_wall(&model.body, &poses), &poses, 1);
         let estimate = reported(&assessor);
-        assert_eq!((assessor.status(), estimate.status), (Status::Tracking, Status::Tracking));
+        assert_eq!((assessor.status, estimate.status), (Status::Tracking, Status::Tracking));
         // Clavicles and the neck have few visible patches that the trunk would not explain.
         let small = |limb: usize| matches!(model.body.roles().limb(limb), Some(LimbRole::Clavicle(_) | LimbRole::Neck));
         for (limb, (own, status)) in model.body.limbs().iter().zip(&estimate.limb_status).enumerate() {
@@ -424,17 +412,17 @@ mod tests {
         put_board(&mut pixels, Vec3::new(0.0, 0.0, 2.5), [0.35, 0.9]);
         let mut assessor = trusting();
         assess_frames(&mut assessor, &pixels, &poses, 10);
-        assert_ne!(assessor.status(), Status::Lost, "a few blurred frames may look flat");
+        assert_ne!(assessor.status, Status::Lost, "a few blurred frames may look flat");
         assess_frames(&mut assessor, &pixels, &poses, 10);
         assert_eq!(reported(&assessor).status, Status::Lost);
         // A body that becomes visible again needs a few frames to be tracked.
         assess_frames(&mut assessor, &before_wall(&model.body, &poses), &poses, 1);
-        assert_eq!(assessor.status(), Status::Lost);
+        assert_eq!(assessor.status, Status::Lost);
         assess_frames(&mut assessor, &before_wall(&model.body, &poses), &poses, 4);
-        assert_eq!(assessor.status(), Status::Tracking);
+        assert_eq!(assessor.status, Status::Tracking);
         assessor.moved();
         assess_frames(&mut assessor, &pixels, &poses, 1);
-        assert_eq!(assessor.status(), Status::Lost);
+        assert_eq!(assessor.status, Status::Lost);
     }
 
     #[test]
