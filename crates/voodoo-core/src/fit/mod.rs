@@ -19,7 +19,7 @@ use crate::detect::{Detected, DetectedLimbs, MeasuredJoint};
 use crate::error::TrackError;
 use crate::math::{Pose, Vec3, refill};
 use crate::regions;
-use crate::solver::{Gate, Problem, Solver, solver};
+use crate::solver::{Gate, Limbwise, Problem, WholeBody};
 use crate::threads::Threads;
 
 /// First step of a frame that uses the depth contour: in earlier steps, it would push thin limbs off their points (method section
@@ -29,7 +29,9 @@ pub(crate) const CONTOUR_FROM: usize = 2;
 /// Fits the pose to a frame, starting from a nearby pose. Keeps the last correspondences.
 #[derive(Debug)]
 pub(crate) struct Fit {
-    solver: Box<dyn Solver>,
+    /// The solvers, of which the configuration chooses one.
+    limbwise: Limbwise,
+    whole_body: WholeBody,
     assignment: Assignment,
     buried: Buried,
     /// The last correspondences.
@@ -48,10 +50,11 @@ pub(crate) struct Fit {
 }
 
 impl Fit {
-    /// Creates the solver and the threads of a configuration.
+    /// Starts the threads of a configuration.
     pub(crate) fn new(config: &Config) -> Result<Self, TrackError> {
         Ok(Self {
-            solver: solver(config.solver),
+            limbwise: Limbwise::default(),
+            whole_body: WholeBody::default(),
             assignment: Assignment::default(),
             buried: Buried::default(),
             correspondences: Correspondences::default(),
@@ -178,7 +181,7 @@ impl Fit {
     }
 
     /// Computes the relative changes of length, one for each pair of limbs, that best fit the correspondences; see
-    /// [`Solver::lengths`].
+    /// [`WholeBody::lengths`]. Returns false when the solver cannot estimate lengths.
     pub(crate) fn lengths(
         &mut self,
         context: Context,
@@ -188,28 +191,29 @@ impl Fit {
         pull: &[f64],
         change: &mut [f64],
     ) -> bool {
-        let Self { solver, correspondences, .. } = self;
+        let Self { whole_body, correspondences, .. } = self;
         let problem = problem(context, correspondences, predicted, context.config.max_steps);
-        solver.lengths(&problem, poses, pairs, pull, change)
+        context.config.solver.is_whole_body() && whole_body.lengths(&problem, poses, pairs, pull, change)
     }
 
     /// Passes the measured positions of named sites to the solver before the frame's steps.
     fn warm_start(&mut self, context: Context, poses: &mut [Pose]) {
         let frame = context.observation.frame();
         let named = !frame.positions.is_empty() || !frame.rays.is_empty();
-        let points = !context.config.solver.is_whole_body();
-        let mut round = 0;
-        loop {
-            if named && points {
+        let is_whole_body = context.config.solver.is_whole_body();
+        for round in 0.. {
+            if named && !is_whole_body {
                 self.match_all(context, poses, 0);
             } else {
                 self.match_sites(context, poses);
             }
-            let Self { solver, correspondences, .. } = self;
-            if !solver.prepare(&problem(context, correspondences, context.previous, round), poses) {
+            let Self { limbwise, whole_body, correspondences, .. } = self;
+            let problem = problem(context, correspondences, context.previous, round);
+            let again =
+                if is_whole_body { whole_body.prepare(&problem, poses) } else { limbwise.prepare(&problem, poses) };
+            if !again {
                 break;
             }
-            round += 1;
         }
     }
 
@@ -270,13 +274,15 @@ impl Fit {
 
     /// Steps 6 and 7: fits the body to the correspondences.
     pub(crate) fn solve(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose], step: usize) {
-        let Self { solver, correspondences, band_weights, .. } = self;
-        // 6 Elastic bands on both limbs.
-        if !context.config.solver.is_whole_body() {
-            correspondences.add_bands(&context.model.body, poses, context.config.band_ratio, band_weights);
+        let Self { limbwise, whole_body, correspondences, band_weights, .. } = self;
+        if context.config.solver.is_whole_body() {
+            whole_body.solve(&problem(context, correspondences, predicted, step), poses);
+            return;
         }
+        // 6 Elastic bands on both limbs.
+        correspondences.add_bands(&context.model.body, poses, context.config.band_ratio, band_weights);
         // 7 Fit the model.
-        solver.solve(&problem(context, correspondences, predicted, step), poses);
+        limbwise.solve(&problem(context, correspondences, predicted, step), poses);
     }
 }
 

@@ -1,6 +1,6 @@
 //! The published solver: weighted absolute orientation of each limb separately (K06 IV-B.7, K07 3.2).
 
-use super::{Problem, Solver, WarmStart};
+use super::{Problem, WarmStart};
 use crate::association::correspondence::LimbMatches;
 use crate::math::{Mat3, Moments, Pose, Vec3};
 
@@ -16,8 +16,9 @@ pub(crate) struct Limbwise {
 /// Warm-start rounds in which the chain follows the sites; each of them reassigns the points.
 const LIMBWISE_ROUNDS: usize = 3;
 
-impl Solver for Limbwise {
-    fn solve(&mut self, problem: &Problem, poses: &mut [Pose]) {
+impl Limbwise {
+    /// One update of all poses (working frame).
+    pub(crate) fn solve(&mut self, problem: &Problem, poses: &mut [Pose]) {
         let correspondences = problem.correspondences;
         for (limb, pose) in poses.iter_mut().enumerate() {
             // Moments about the limb's own position keep the sums well conditioned.
@@ -43,7 +44,9 @@ impl Solver for Limbwise {
         }
     }
 
-    fn prepare(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {
+    /// Warm start: follows the named sites before the first step of a frame. Returns true to request another round.
+    /// `problem.predicted` are the poses before the frame.
+    pub(crate) fn prepare(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {
         if !self.warm_start.drives_all(problem) {
             return false;
         }

@@ -1,4 +1,5 @@
-//! Step 7: fits the pose to the correspondences. The solver is the one replaceable part of the step.
+//! Step 7: fits the pose to the correspondences. The solver is the one replaceable part of the step: [`Limbwise`], or
+//! [`WholeBody`] with or without elastic bands.
 
 mod chain;
 mod lengths;
@@ -20,8 +21,8 @@ pub(crate) use whole_body::{LENGTH_INFORMATION, OVERLAP_SIGMA, SITE_SCALE, Whole
 
 use crate::association::correspondence::Correspondences;
 use crate::body::two_bone::TwoBone;
-use crate::body::{Body, Pair};
-use crate::config::{Config, SolverKind};
+use crate::body::Body;
+use crate::config::Config;
 use crate::math::Pose;
 use crate::observation::frame::Ground;
 
@@ -53,37 +54,4 @@ pub(crate) struct Problem<'a> {
     pub time_scale: f64,
     /// Parameters.
     pub config: &'a Config,
-}
-
-/// Moves the limbs towards their correspondences: prepares a frame, then solves every step of it.
-pub(crate) trait Solver: std::fmt::Debug + Send + Sync {
-    /// Warm start: follows the named sites before the first step of a frame. Returns true to request another round.
-    /// `problem.predicted` are the poses before the frame.
-    fn prepare(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool;
-
-    /// One update of all poses (working frame).
-    fn solve(&mut self, problem: &Problem, poses: &mut [Pose]);
-
-    /// Writes the relative changes of the lengths of `pairs` that fit the correspondences at `poses` to `change`. On input,
-    /// `change` holds the change from each length to the one it is regularized to, with information `pull`. Returns false when
-    /// the solver cannot estimate lengths.
-    fn lengths(
-        &mut self,
-        _problem: &Problem,
-        _poses: &[Pose],
-        _pairs: &[Pair],
-        _pull: &[f64],
-        _change: &mut [f64],
-    ) -> bool {
-        false
-    }
-}
-
-/// Creates the solver of a configuration.
-pub(crate) fn solver(kind: SolverKind) -> Box<dyn Solver> {
-    match kind {
-        SolverKind::Limbwise => Box::new(Limbwise::default()),
-        SolverKind::Chain => Box::new(WholeBody::default()),
-        SolverKind::Tree => Box::new(WholeBody::tree()),
-    }
 }

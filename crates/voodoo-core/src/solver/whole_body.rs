@@ -2,8 +2,9 @@
 
 use super::lengths::Lengths;
 use super::schedule::narrowed;
-use super::{ChainSolver, LIMIT_SIGMA, Problem, Solver, TreeSolver, WarmStart};
+use super::{ChainSolver, LIMIT_SIGMA, Problem, TreeSolver, WarmStart};
 use crate::body::{JointKind, Pair};
+use crate::config::SolverKind;
 use crate::math::{Pose, Quat, Vec3, refill, reset};
 use crate::terms::normal_equations::NormalEquations;
 use crate::terms::{DetectedJoints, Floor, Limits, Measurements, Penetration, Posture, Prior, Rest, Term};
@@ -43,8 +44,8 @@ const WARM_START_ROUNDS: usize = 4;
 pub(crate) struct WholeBody {
     normal: NormalEquations,
     chain: ChainSolver,
-    /// Solves for the limbs instead of the chain, if present.
-    tree: Option<TreeSolver>,
+    /// Solves for the limbs instead of the chain, with elastic bands at the joints.
+    tree: TreeSolver,
     lengths: Lengths,
     warm_start: WarmStart,
     joint_sigmas: Vec<f64>,
@@ -69,37 +70,43 @@ struct Stillness {
     holds: Vec<f64>,
 }
 
-impl Solver for WholeBody {
-    fn solve(&mut self, problem: &Problem, poses: &mut [Pose]) {
+impl WholeBody {
+    /// One update of all poses (working frame).
+    pub(crate) fn solve(&mut self, problem: &Problem, poses: &mut [Pose]) {
         self.sum_terms(problem, poses, true);
         let follows = problem.step + 1 < problem.config.max_steps;
         let stride = if follows { 1.0 + self.points * OVER_RELAXATION } else { 1.0 };
-        match &mut self.tree {
-            Some(tree) => tree.step(problem.body, &self.normal, stride, problem.config.band_sigma, poses),
-            None => self.chain.step(problem.body, &self.normal, stride, poses),
+        match problem.config.solver {
+            SolverKind::Tree => self.tree.step(problem.body, &self.normal, stride, problem.config.band_sigma, poses),
+            _ => self.chain.step(problem.body, &self.normal, stride, poses),
         }
     }
 
-    fn lengths(&mut self, problem: &Problem, poses: &[Pose], pairs: &[Pair], pull: &[f64], change: &mut [f64]) -> bool {
+    /// Writes the relative changes of the lengths of `pairs` that fit the correspondences at `poses` to `change`. On input,
+    /// `change` holds the change from each length to the one it is regularized to, with information `pull`. Returns false when
+    /// the lengths are not determined.
+    pub(crate) fn lengths(
+        &mut self,
+        problem: &Problem,
+        poses: &[Pose],
+        pairs: &[Pair],
+        pull: &[f64],
+        change: &mut [f64],
+    ) -> bool {
         self.sum_terms(problem, poses, false);
         let Self { normal, chain, lengths, .. } = self;
         chain.lengths(problem.body, normal, poses, pairs, pull, change, lengths)
     }
 
-    fn prepare(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {
+    /// Warm start: follows the named sites before the first step of a frame. Returns true to request another round.
+    /// `problem.predicted` are the poses before the frame.
+    pub(crate) fn prepare(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {
         // At such a distance, points assigned to the limb at its old pose would hold it there.
-        if self.tree.is_some() || !self.warm_start.drives_far(problem, DRIVEN_FROM) {
+        if problem.config.solver == SolverKind::Tree || !self.warm_start.drives_far(problem, DRIVEN_FROM) {
             return false;
         }
         self.warm_start.step(problem, poses);
         problem.step + 1 < WARM_START_ROUNDS
-    }
-}
-
-impl WholeBody {
-    /// A solver with the same terms, and elastic bands at the joints.
-    pub(crate) fn tree() -> Self {
-        Self { tree: Some(TreeSolver::default()), ..Self::default() }
     }
 
     /// Sums the normal equations at `poses`, with or without the sites that have a bias.
