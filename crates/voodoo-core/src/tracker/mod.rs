@@ -18,7 +18,7 @@ use crate::observation::candidates::body_box;
 use crate::observation::frame::Frame;
 use crate::observation::observer::{Observer, Own};
 use crate::observation::ownership::OwnershipMask;
-use crate::relocalize::{DetectionVerdict, Reasons, Relocalizer, trunk_is_elsewhere};
+use crate::relocalize::{DetectionVerdict, Reasons, Relocalizer, distance_cost, trunk_is_elsewhere};
 use crate::sizes::{Reliance, Sizes, Start};
 use crate::uncertainty::{FittedPose, Uncertainty};
 use assess::Assessor;
@@ -260,7 +260,9 @@ impl BodyTracker {
         } else {
             relocalizer.detect(&model.body, frame, ownership, root, reasons);
             if let Some(last) = motion.stamp.filter(|_| !interrupted && relocalizer.check.is_detected()) {
-                relocalizer.forget_somebody_else(root, frame.stamp - last);
+                // One too far from where the person was tracked last is of somebody else.
+                let cost = |found: &PlacedDetection| distance_cost(found.root.distance(root), frame.stamp - last);
+                relocalizer.detection.take_if(|found| cost(found).is_infinite());
             }
         }
         if config.relocalization {
@@ -437,12 +439,12 @@ impl BodyTracker {
         };
         let (body, poses, correspondences) = (&model.body, &motion.poses, &fit.correspondences);
         let (pairs, sizes_found) = (sizes.refined_pairs(), sizes.found_with_pose());
-        let found = FittedPose { body, poses, correspondences, pairs, sizes_found, time_scale, config };
+        let found = FittedPose { model, poses, correspondences, pairs, sizes_found, time_scale, config };
         let branch_distance = |limb: usize| {
             let length = body.limbs()[limb].shape.length();
             hypotheses.branch.end_distance(limb, length, &estimate.world_from_limb[limb])
         };
-        assessor.follow_edges(model, found, branch_distance);
+        assessor.follow_edges(found, branch_distance);
         assessor.report_status(model, estimate);
         let Estimate { limb_status, covariances, .. } = estimate;
         uncertainty.estimate(found, |limb| limb_status[limb] == LimbStatus::Measured, covariances);

@@ -4,13 +4,11 @@
 //! sees the limb from another side. The filter keeps the joint information matrix of all unknowns of the chain. The information
 //! fades as the body moves, and grows by that of each frame's edges.
 
-use super::{MAX_SIGMA, USUAL_MOTION};
-use crate::association::correspondence::Correspondences;
+use super::{FittedPose, MAX_SIGMA, USUAL_MOTION};
 use crate::body::kinematics::freedoms;
 use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Model};
-use crate::config::Config;
-use crate::math::{Pose, Vec3, factor, refill, reset};
+use crate::math::{Vec3, factor, refill, reset};
 use crate::solver::{SITE_SCALE, Spread};
 use crate::terms::{Regions, Sites, Term};
 
@@ -47,18 +45,11 @@ impl EdgeFilter {
         self.sigma.get(limb).copied().unwrap_or(f64::INFINITY)
     }
 
-    /// Updates the filter with the matches at `poses`; the time since the last frame is given in multiples of 1/30 s.
-    pub(crate) fn observe(
-        &mut self,
-        model: &Model,
-        poses: &[Pose],
-        correspondences: &Correspondences,
-        time_scale: f64,
-        config: &Config,
-    ) {
-        let body = &model.body;
-        self.expect(body, time_scale);
-        self.sum_terms(model, poses, correspondences, config);
+    /// Updates the filter with a frame.
+    pub(crate) fn observe(&mut self, found: FittedPose) {
+        let FittedPose { model: Model { body, .. }, poses, .. } = found;
+        self.expect(body, found.time_scale);
+        self.sum_terms(found);
         let Self { spread, known, sigma, .. } = self;
         sigma.clear();
         let add = |h: &mut [f64]| {
@@ -115,8 +106,9 @@ impl EdgeFilter {
     }
 
     /// Adds the frame's information on every limb, weighted by how strongly the limb is supported.
-    fn sum_terms(&mut self, model: &Model, poses: &[Pose], correspondences: &Correspondences, config: &Config) {
-        let (normal, Model { body, extremities, .. }) = (&mut self.spread.normal, model);
+    fn sum_terms(&mut self, found: FittedPose) {
+        let FittedPose { model: Model { body, extremities, .. }, poses, correspondences, config, .. } = found;
+        let normal = &mut self.spread.normal;
         normal.clear(poses.len());
         Regions { pairs: &correspondences.regions, colors: None }.add(body, poses, normal);
         for (limb, block) in normal.limbs.iter_mut().enumerate() {
@@ -143,7 +135,9 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::*;
-    use crate::association::correspondence::{RegionPair, RegionSupport};
+    use crate::association::correspondence::{Correspondences, RegionPair, RegionSupport};
+    use crate::config::Config;
+    use crate::math::Pose;
     use crate::testing::standing;
 
     /// Edges of all limbs, seen by cameras that look at right angles to `normals`; either all edges support their limb, or none
@@ -160,16 +154,22 @@ mod tests {
         found
     }
 
+    /// Updates a filter with a frame of these edges.
+    fn observe(filter: &mut EdgeFilter, model: &Model, poses: &[Pose], correspondences: &Correspondences) {
+        let (pairs, sizes_found, time_scale, config) = (&[], false, 1.0, &Config::default());
+        filter.observe(FittedPose { model, poses, correspondences, pairs, sizes_found, time_scale, config });
+    }
+
     /// Standard deviations of a forearm's distal end in frames with such edges.
     fn sigmas(frames: &[(&[Vec3], f64)]) -> Vec<f64> {
         let (model, poses) = standing();
         let lower = model.extremities[crate::testing::first_arm(&model)].lower;
         let mut filter = EdgeFilter::default();
-        let observe = |(normals, own): &(&[Vec3], f64)| {
-            filter.observe(&model, &poses, &edges(&model, &poses, normals, *own), 1.0, &Config::default());
+        let sigma = |(normals, own): &(&[Vec3], f64)| {
+            observe(&mut filter, &model, &poses, &edges(&model, &poses, normals, *own));
             filter.end_sigma(lower)
         };
-        frames.iter().map(observe).collect()
+        frames.iter().map(sigma).collect()
     }
 
     #[test]
@@ -194,7 +194,7 @@ mod tests {
         let (model, poses) = standing();
         let mut filter = EdgeFilter::default();
         let found = edges(&model, &poses, &[Vec3::X, Vec3::Z], 0.7);
-        filter.observe(&model, &poses, &found, 1.0, &Config::default());
+        observe(&mut filter, &model, &poses, &found);
         let n = filter.still.len();
         let whole = |known: &[f64]| DMatrix::from_fn(n, n, |i, j| known[i.max(j) * n + i.min(j)]);
         let before = whole(&filter.known);
@@ -209,7 +209,7 @@ mod tests {
         let mut filter = EdgeFilter::default();
         assert_eq!(filter.end_sigma(0), f64::INFINITY);
         let (model, poses) = standing();
-        filter.observe(&model, &poses, &edges(&model, &poses, &[Vec3::X], 1.0), 1.0, &Config::default());
+        observe(&mut filter, &model, &poses, &edges(&model, &poses, &[Vec3::X], 1.0));
         assert!(filter.end_sigma(0) < 0.1);
         filter.forget();
         assert_eq!(filter.end_sigma(0), f64::INFINITY);

@@ -14,7 +14,7 @@ pub(crate) use edge_filter::EdgeFilter;
 
 use crate::association::correspondence::Correspondences;
 use crate::body::kinematics::{freedoms, joint_axes};
-use crate::body::{Body, Pair};
+use crate::body::{Model, Pair};
 use crate::config::Config;
 use crate::math::{Pose, Vec3};
 use crate::sizes::girth::ALIKE;
@@ -51,7 +51,7 @@ pub(crate) struct Uncertainty {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FittedPose<'a> {
     /// The tracked model.
-    pub body: &'a Body,
+    pub model: &'a Model,
     /// Its poses, working frame.
     pub poses: &'a [Pose],
     /// Correspondences at these poses.
@@ -83,14 +83,15 @@ impl Uncertainty {
         self.expect(found);
         self.sum_terms(found, proven);
         let Self { spread, variance, information, .. } = self;
-        covariances.forget(found.body);
+        let body = &found.model.body;
+        covariances.forget(body);
         let step = information.len() + 1;
         let add = |h: &mut [f64]| h.iter_mut().step_by(step).zip(&*information).for_each(|(value, own)| *value += own);
-        if !spread.factor(found.body, found.poses, add) {
+        if !spread.factor(body, found.poses, add) {
             return;
         }
         variance.clear();
-        for (limb, part) in found.body.limbs().iter().enumerate() {
+        for (limb, part) in body.limbs().iter().enumerate() {
             let own = spread.of_joint(limb);
             variance.extend((0..freedoms(part)).map(|index| own[(index, index)]));
             let axes = part
@@ -101,13 +102,13 @@ impl Uncertainty {
             let covariance = spread.of_limb(limb, found.poses[limb].translation);
             covariances.set_limb(limb, &covariance, SITE_SIGMA[usize::from(found.sizes_found)]);
         }
-        for (index, site) in found.body.sites().iter().enumerate() {
+        for (index, site) in body.sites().iter().enumerate() {
             covariances.set_site(index, site.limb, found.poses[site.limb].rotation * site.position);
         }
         self.learn_lengths(found);
         for (pair, known) in found.pairs.iter().zip(&self.known) {
             for limb in pair {
-                covariances.lengths[*limb] = found.body.limbs()[*limb].shape.length() / known.sqrt();
+                covariances.lengths[*limb] = body.limbs()[*limb].shape.length() / known.sqrt();
             }
         }
     }
@@ -115,7 +116,7 @@ impl Uncertainty {
     /// Adds the frame's information on the limbs' lengths; errors of successive frames are correlated.
     fn learn_lengths(&mut self, found: FittedPose) {
         let Self { spread, known, length_information, work, .. } = self;
-        work.information(&spread.system, found.body, found.poses, found.pairs, length_information);
+        work.information(&spread.system, &found.model.body, found.poses, found.pairs, length_information);
         known.resize(found.pairs.len(), LENGTH_INFORMATION[1]);
         for (known, length_information) in known.iter_mut().zip(length_information) {
             *known += *length_information / ALIKE;
@@ -125,14 +126,14 @@ impl Uncertainty {
     /// Returns the information of every unknown before the frame: that after the last frame, reduced by the motion since.
     fn expect(&mut self, found: FittedPose) {
         let Self { variance, information, .. } = self;
-        let FittedPose { body, time_scale, config, .. } = found;
+        let FittedPose { model, time_scale, config, .. } = found;
         information.clear();
         let mut expect = |sigma: f64| {
             let moved = (sigma * time_scale).powi(2);
             let before = variance.get(information.len()).copied().unwrap_or(moved);
             information.push(1.0 / (before + moved).min(MAX_SIGMA * MAX_SIGMA));
         };
-        for limb in body.limbs() {
+        for limb in model.body.limbs() {
             match &limb.parent {
                 None => {
                     for sigma in [config.root_turn_sigma, config.root_shift_sigma] {
@@ -146,7 +147,7 @@ impl Uncertainty {
 
     /// Returns the frame's information on every limb, limited to the number of independent measurements.
     fn sum_terms(&mut self, found: FittedPose, proven: impl Fn(usize) -> bool) {
-        let FittedPose { body, poses, correspondences, config, .. } = found;
+        let FittedPose { model: Model { body, .. }, poses, correspondences, config, .. } = found;
         let normal = &mut self.spread.normal;
         normal.clear(poses.len());
         let measurements = Measurements::new(correspondences, config, config.kernel_end, SITE_SCALE, true);
@@ -184,17 +185,9 @@ mod tests {
             let mut covariances = Covariances::default();
             (0..frames)
                 .map(|frame| {
-                    let correspondences = &fit.correspondences;
-                    let (body, config) = (&model.body, &config);
-                    let found = FittedPose {
-                        body,
-                        poses: &poses,
-                        correspondences,
-                        pairs: &pairs,
-                        sizes_found,
-                        time_scale: 1.0,
-                        config,
-                    };
+                    let (model, poses, pairs, config) = (&model, &poses, &pairs, &config);
+                    let (correspondences, time_scale) = (&fit.correspondences, 1.0);
+                    let found = FittedPose { model, poses, correspondences, pairs, sizes_found, time_scale, config };
                     uncertainty.estimate(found, |limb| proven(frame, limb), &mut covariances);
                     let trace = |site: &crate::math::Mat3| site.col(0)[0] + site.col(1)[1] + site.col(2)[2];
                     (covariances.clone(), covariances.sites.iter().map(trace).collect())

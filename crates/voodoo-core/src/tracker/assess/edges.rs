@@ -3,7 +3,6 @@
 
 use super::Assessor;
 use crate::association::correspondence::RegionSupport;
-use crate::body::Model;
 use crate::uncertainty::FittedPose;
 use crate::visibility::EXPLAINED;
 
@@ -12,11 +11,10 @@ impl Assessor {
     /// end to that in the second branch, if there is one.
     pub(in crate::tracker) fn follow_edges(
         &mut self,
-        model: &Model,
         found: FittedPose,
         branch_distance: impl Fn(usize) -> Option<f64>,
     ) {
-        let FittedPose { poses, correspondences, time_scale, config, .. } = found;
+        let FittedPose { model, correspondences, .. } = found;
         let points = correspondences.limbs.iter().any(|matches| !matches.candidate.is_empty());
         let pictures = !correspondences.region_support.is_empty();
         if points || !pictures && !self.by_edges {
@@ -24,7 +22,7 @@ impl Assessor {
             return;
         }
         self.by_edges = true;
-        self.edges.observe(model, poses, correspondences, time_scale, config);
+        self.edges.observe(found);
         let Self { edges, log_odds, .. } = self;
         for chain in &model.extremities {
             for limb in [chain.upper, chain.lower] {
@@ -53,6 +51,7 @@ impl Assessor {
 mod tests {
     use super::*;
     use crate::association::correspondence::{Correspondences, LimbMatches, RegionPair};
+    use crate::body::Model;
     use crate::config::Config;
     use crate::math::{Pose, Vec3};
     use crate::testing::{first_arm, standing};
@@ -80,9 +79,9 @@ mod tests {
         correspondences: &Correspondences,
         apart: Option<f64>,
     ) {
-        let (body, config, pairs) = (&model.body, &Config::default(), &[]);
-        let found = FittedPose { body, poses, correspondences, pairs, sizes_found: false, time_scale: 1.0, config };
-        assessor.follow_edges(model, found, |_| apart);
+        let (config, pairs) = (&Config::default(), &[]);
+        let found = FittedPose { model, poses, correspondences, pairs, sizes_found: false, time_scale: 1.0, config };
+        assessor.follow_edges(found, |_| apart);
     }
 
     /// Log odds of an arm, and of its hand, after a frame with these edges.
