@@ -28,8 +28,7 @@ use histogram::Kind;
 use labels::LimbLabels;
 use lines::{Line, OcclusionDepth, Viewer};
 use models::ColorModel;
-pub(crate) use pixel_gain::PixelGain;
-use pixel_gain::{Backdrop, camera_from_limb_at};
+use pixel_gain::camera_from_limb_at;
 use scan::{EdgeSearch, ScanView};
 
 /// The edge search of each step of a frame: wide and coarse at first, then narrower and finer.
@@ -64,7 +63,6 @@ struct Learned {
     lines: Vec<Line>,
     /// The edge found on each line.
     edges: Vec<Option<scan::LineEdge>>,
-    camera_from_limb: Vec<Pose>,
     known: bool,
 }
 
@@ -82,8 +80,10 @@ pub(crate) struct ColorRegions {
     /// Offset of the cameras that learn in the next frame.
     turn: usize,
     evidence: Vec<Evidence>,
-    /// The limbs that were drawn last, for what other limbs explain beside them.
-    backdrop: Backdrop,
+    /// Label images of some limbs, one per camera, for what other limbs explain beside them; and whether each limb is drawn.
+    backdrop: Vec<LimbLabels>,
+    drawn: Vec<bool>,
+    camera_from_limb: Vec<Pose>,
 }
 
 /// The body at the time of a frame, in the working frame.
@@ -296,13 +296,13 @@ impl ColorRegions {
 
     /// Places the lines of one image.
     fn place_lines(&mut self, frame: &Frame, picture: &ColorImage, posed: Posed) {
-        let camera_from_limb = camera_from_limb_at(self.stamp, frame, picture, posed);
-        let camera = self.camera(picture.number);
-        refill(&mut camera.camera_from_limb, (0..posed.poses.len()).map(camera_from_limb));
+        let limb = camera_from_limb_at(self.stamp, frame, picture, posed);
+        let mut camera_from_limb = std::mem::take(&mut self.camera_from_limb);
+        refill(&mut camera_from_limb, (0..posed.poses.len()).map(limb));
         let [fx, fy] = picture.camera.focal();
-        camera.unit = (0.5 * (fx + fy) / FOCAL) as f32;
-        let (body, Learned { unit, labels, lines, camera_from_limb, .. }) = (posed.body, camera);
-        labels.draw(body, camera_from_limb, picture.camera, CELL_BITS, |_| true);
+        let (body, Learned { unit, labels, lines, .. }) = (posed.body, self.camera(picture.number));
+        *unit = (0.5 * (fx + fy) / FOCAL) as f32;
+        labels.draw(body, &camera_from_limb, picture.camera, CELL_BITS, |_| true);
         lines.clear();
         // Reserves the full capacity at once: the number of lines differs from pose to pose.
         lines.reserve(2 * MOST_LINES * camera_from_limb.len());
@@ -312,6 +312,7 @@ impl ColorRegions {
             let lines_a_side = (body.limbs()[limb].shape.length() / SPACING).round() as usize;
             viewer.add(limb, pose, lines_a_side.clamp(LEAST_LINES, MOST_LINES), lines);
         }
+        self.camera_from_limb = camera_from_limb;
     }
 
     /// Learns the colors along the lines of one image, except those of limbs with weak evidence.

@@ -22,42 +22,27 @@ const OVER: [f64; 5] = [-0.7, -0.35, 0.0, 0.35, 0.7];
 /// Backdrops are drawn in cells of two to this power pixels.
 const BACKDROP_BITS: u32 = 2;
 
-/// Color evidence for a limb, in patches, averaged over all cameras.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct PixelGain {
-    /// Area that the limb explains better than what would be visible without it, minus the area that it explains worse. For a
-    /// limb with unambiguous colors this is its whole visible area.
-    pub gained: f64,
-    /// Its area in the images, occluded or not.
-    pub area: f64,
-}
-
-/// Label images of selected limbs, one per camera.
-#[derive(Debug, Default)]
-pub(super) struct Backdrop {
-    planes: Vec<LimbLabels>,
-    camera_from_limb: Vec<Pose>,
-    /// Whether each limb is drawn.
-    drawn: Vec<bool>,
-}
-
 impl ColorRegions {
     /// Draws the `visible` limbs into the backdrop of each camera, which shows only them afterwards.
     pub(crate) fn draw(&mut self, frame: &Frame, posed: Posed, visible: impl Fn(usize) -> bool) {
-        let Backdrop { planes, camera_from_limb, drawn } = &mut self.backdrop;
+        let Self { backdrop, drawn, camera_from_limb, .. } = self;
         refill(drawn, (0..posed.poses.len()).map(&visible));
-        planes.resize_with(frame.colors.len(), LimbLabels::default);
-        for (picture, labels) in frame.colors.iter().zip(planes) {
+        backdrop.resize_with(frame.colors.len(), LimbLabels::default);
+        for (picture, labels) in frame.colors.iter().zip(backdrop) {
             let limb = camera_from_limb_at(self.stamp, frame, picture, posed);
             refill(camera_from_limb, (0..posed.poses.len()).map(limb));
             labels.draw(posed.body, camera_from_limb, picture.camera, BACKDROP_BITS, &visible);
         }
     }
 
-    /// What a limb explains in addition to the limbs that were drawn into the backdrop last. Of a limb that is drawn there itself,
+    /// Color evidence for a limb, in patches, averaged over all cameras: the area that the limb explains better than what would be
+    /// visible without it, minus the area that it explains worse; and its area in the images, occluded or not. For a limb with
+    /// unambiguous colors the first is its whole visible area.
+    ///
+    /// What would be visible without it are the limbs that were drawn into the backdrop last. Of a limb that is drawn there itself,
     /// only the pixels count that show it, and nothing is known to be behind it.
-    pub(crate) fn pixel_gain(&self, frame: &Frame, posed: Posed, limb: usize) -> PixelGain {
-        let is_drawn = self.backdrop.drawn.get(limb).is_some_and(|drawn| *drawn);
+    pub(crate) fn pixel_gain(&self, frame: &Frame, posed: Posed, limb: usize) -> [f64; 2] {
+        let is_drawn = self.drawn.get(limb).is_some_and(|drawn| *drawn);
         // What would be visible at a cell without the limb, which has this depth there; `None` where the limb is occluded.
         let behind = |(label, behind): (u16, f32), depth: f64| {
             if is_drawn {
@@ -65,16 +50,16 @@ impl ColorRegions {
             }
             (label == NOTHING || f64::from(behind) > depth - f64::from(NEARER_BY)).then_some(label)
         };
-        let mut gain = PixelGain::default();
+        let [mut gained, mut all] = [0.0; 2];
         let shape = &posed.body.limbs()[limb].shape;
         let group = usize::from(self.groups[limb]);
-        for (picture, labels) in frame.colors.iter().zip(&self.backdrop.planes) {
+        for (picture, labels) in frame.colors.iter().zip(&self.backdrop) {
             let known = self.cameras.iter().find(|camera| camera.number == picture.number && camera.known);
             let Some(camera) = known.filter(|camera| camera.model.knows(group)) else { continue };
             let view = camera.view(picture, labels, &self.groups);
             let camera_from_limb = camera_from_limb_at(self.stamp, frame, picture, posed)(limb);
             places(shape, &camera_from_limb, picture.camera, |[u, v], depth, area| {
-                gain.area += area;
+                all += area;
                 let [width, height] = [picture.camera.width(), picture.camera.height()];
                 if !(u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64) {
                     return;
@@ -84,12 +69,12 @@ impl ColorRegions {
                     let pixel = row * width + column;
                     let bin = bin_of(&picture.pixels, pixel);
                     // The log ratio as a fraction of its bound.
-                    gain.gained += area * f64::from(view.ratio(group, other, pixel, bin) / MOST_RATIO);
+                    gained += area * f64::from(view.ratio(group, other, pixel, bin) / MOST_RATIO);
                 }
             });
         }
         let cameras = frame.colors.len().max(1) as f64;
-        PixelGain { gained: gain.gained / cameras, area: gain.area / cameras }
+        [gained / cameras, all / cameras]
     }
 
     /// Writes to `supports` what every limb of the arms and legs explains that no limb outside its own arm or leg does.
@@ -103,10 +88,7 @@ impl ColorRegions {
         for chain in chains {
             self.draw(frame, posed, |limb| chain.limbs().all(|own| own != limb));
             for limb in chain.limbs() {
-                let gain = self.pixel_gain(frame, posed, limb);
-                if let Some(support) = supports.get_mut(limb) {
-                    (support.gained, support.area) = (gain.gained, gain.area);
-                }
+                [supports[limb].gained, supports[limb].area] = self.pixel_gain(frame, posed, limb);
             }
         }
     }

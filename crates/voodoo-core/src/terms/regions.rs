@@ -5,7 +5,7 @@ use crate::association::correspondence::RegionPair;
 use crate::body::Body;
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::Frame;
-use crate::regions::{ColorRegions, PixelGain, Posed};
+use crate::regions::{ColorRegions, Posed};
 use crate::terms::normal_equations::{NormalEquations, line};
 
 /// All edges.
@@ -30,14 +30,6 @@ pub(crate) struct Colors<'a> {
     pub origin: Vec3,
 }
 
-impl Colors<'_> {
-    /// What a limb explains of the images.
-    pub(crate) fn pixel_gain(&self, body: &Body, poses: &[Pose], limb: usize) -> PixelGain {
-        let Self { regions, frame, previous, origin } = *self;
-        regions.pixel_gain(frame, Posed { body, poses, previous, origin }, limb)
-    }
-}
-
 impl Term for Regions<'_> {
     fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut NormalEquations) {
         for pair in self.pairs {
@@ -48,6 +40,8 @@ impl Term for Regions<'_> {
     }
 
     fn cost(&self, body: &Body, poses: &[Pose], limb: usize) -> f64 {
-        -PATCH * self.colors.map_or(0.0, |colors| colors.pixel_gain(body, poses, limb).gained)
+        let Some(Colors { regions, frame, previous, origin }) = self.colors else { return 0.0 };
+        let [gained, _] = regions.pixel_gain(frame, Posed { body, poses, previous, origin }, limb);
+        -PATCH * gained
     }
 }
