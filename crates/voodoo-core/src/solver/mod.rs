@@ -20,8 +20,8 @@ pub(crate) use warm_start::WarmStart;
 pub(crate) use whole_body::{LENGTH_INFORMATION, OVERLAP_SIGMA, SITE_SCALE, WholeBody};
 
 use crate::association::correspondence::Correspondences;
-use crate::body::two_bone::TwoBone;
 use crate::body::Body;
+use crate::body::two_bone::TwoBone;
 use crate::config::Config;
 use crate::math::Pose;
 use crate::observation::frame::Ground;

@@ -12,7 +12,7 @@ use super::{ChainSolver, LIMIT_SIGMA, Problem};
 use crate::association::correspondence::SitePair;
 use crate::body::Body;
 use crate::body::kinematics::{joint_turn, place};
-use crate::math::{Pose, reset};
+use crate::math::{Pose, refill, reset};
 use crate::terms::normal_equations::{LimbBlock, NormalEquations};
 use crate::terms::{Limits, Prior, Sites, Surface, Term};
 
@@ -75,10 +75,8 @@ impl WarmStart {
             self.closed.clone_from(&self.start);
         }
         let time_scale = problem.time_scale * config.motion_scale;
-        self.joint_sigmas.clear();
-        self.joint_sigmas.extend(
-            body.limbs().iter().map(|part| part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion) * time_scale),
-        );
+        let motions = body.limbs().iter().map(|part| part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion));
+        refill(&mut self.joint_sigmas, motions.map(|motion| motion * time_scale));
         let root = [config.root_turn_sigma, config.root_shift_sigma].map(|sigma| sigma * time_scale);
         self.normal.clear(poses.len());
         // Where points are used, the weights are those before the reduction for bias: otherwise a site within its bias would
@@ -99,18 +97,14 @@ impl WarmStart {
             term.add(body, &self.closed, &mut self.normal);
         }
         self.before.clone_from(&self.closed);
-        self.chain.step(body, &self.normal, 1.0, &mut self.closed);
-        // Limbs that are not driven keep their poses.
         self.moved.clone_from(&self.closed);
-        for (limb, part) in body.limbs().iter().enumerate() {
-            self.closed[limb] = match &part.parent {
-                Some((parent, joint)) if self.driven[limb] => {
-                    let turn = joint_turn(joint, &self.moved[*parent], &self.moved[limb]);
-                    place(joint, &self.closed[*parent], turn)
-                }
-                None if self.driven[limb] => self.moved[limb],
-                _ => self.before[limb],
-            };
+        self.chain.step(body, &self.normal, 1.0, &mut self.moved);
+        // Limbs that are not driven keep their poses.
+        for (limb, part) in body.limbs().iter().enumerate().filter(|(limb, _)| self.driven[*limb]) {
+            self.closed[limb] = part.parent.as_ref().map_or(self.moved[limb], |(parent, joint)| {
+                let turn = joint_turn(joint, &self.moved[*parent], &self.moved[limb]);
+                place(joint, &self.closed[*parent], turn)
+            });
         }
         for ((pose, before), after) in poses.iter_mut().zip(&self.before).zip(&self.closed) {
             *pose = *after * before.inverse() * *pose;
