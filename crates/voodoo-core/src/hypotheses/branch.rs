@@ -6,7 +6,7 @@
 //! uncertainty.
 
 use super::objective::MARGIN;
-use super::refined::{REFINE, Refined};
+use super::refined::Refined;
 use crate::config::Config;
 use crate::fit::{Context, Fit, Motion};
 use crate::math::{Pose, Vec3, refill, shifted};
@@ -81,8 +81,8 @@ impl Branch {
             let now = refined.cost(context, fit, poses);
             self.tried.clone_from(poses);
             chain.place_between(body, &mut self.tried, self.poses[chain.lower].translation, chain.end(&self.poses));
-            let cost = refined.refine(context, fit, &self.tried);
-            steps += REFINE;
+            let (taken, cost) = refined.refine(context, fit, &self.tried, None);
+            steps += taken;
             if cost < now - MARGIN {
                 poses.clone_from(&refined.poses);
                 predicted.clone_from(&self.tried);
@@ -118,6 +118,7 @@ fn set_shifted(to: &mut Vec<Pose>, from: &[Pose], origin: Vec3) {
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
+    use crate::hypotheses::REFINE;
     use crate::testing::{before_wall, first_arm, moved, raised, standing, with_context, without_background};
 
     #[test]

@@ -29,8 +29,7 @@ pub(crate) struct Objective<'a> {
     regions: Regions<'a>,
     limits: Limits,
     penetration: Penetration<'a>,
-    floor: Option<Floor>,
-    stance: Option<Stance<'a>>,
+    floor: Option<(Floor, Stance<'a>)>,
 }
 
 impl<'a> Objective<'a> {
@@ -60,8 +59,9 @@ impl<'a> Objective<'a> {
             regions: Regions { pairs: &correspondences.regions, colors },
             limits: Limits { sigma: LIMIT_SIGMA },
             penetration: Penetration { sigma: OVERLAP_SIGMA, spheres: &[] },
-            floor: observation.floor().map(|plane| Floor { plane, sigma: OVERLAP_SIGMA }),
-            stance: observation.floor().map(|floor| Stance { extremities: &model.extremities, floor }),
+            floor: observation.floor().map(|plane| {
+                (Floor { plane, sigma: OVERLAP_SIGMA }, Stance { extremities: &model.extremities, floor: plane })
+            }),
         }
     }
 
@@ -69,9 +69,8 @@ impl<'a> Objective<'a> {
     pub(crate) fn limb(&self, poses: &[Pose], limb: usize) -> f64 {
         let terms: [&dyn Term; 6] =
             [&self.free_space, &self.sites, &self.detected, &self.regions, &self.limits, &self.penetration];
-        let floor = self.floor.iter().map(|floor| floor as &dyn Term);
-        let stance = self.stance.iter().map(|stance| stance as &dyn Term);
-        terms.into_iter().chain(floor).chain(stance).map(|term| term.cost(self.body, poses, limb)).sum()
+        let floor = self.floor.iter().flat_map(|(floor, stance)| [floor as &dyn Term, stance]);
+        terms.into_iter().chain(floor).map(|term| term.cost(self.body, poses, limb)).sum()
     }
 
     /// Cost of the matched poses of the whole body. A point that no limb explains costs a patch of its weight.

@@ -41,13 +41,13 @@ impl Refined {
         current: f64,
         hypothesis: &[Pose],
     ) -> (usize, bool) {
-        let (steps, cost) = self.refine_against(context, fit, hypothesis, Some(poses));
+        let (steps, cost) = self.refine(context, fit, hypothesis, Some(poses));
         fit.swap_matches(&mut self.matched);
         if steps < REFINE || cost >= current - MARGIN {
             return (steps, false);
         }
         std::mem::swap(&mut self.poses, &mut self.tried);
-        let settled = self.refine(context, fit, poses);
+        let (_, settled) = self.refine(context, fit, poses, None);
         if cost < settled - MARGIN && is_another(context, &self.tried, &self.poses) {
             refill(predicted, hypothesis.iter().copied());
             poses.clone_from(&self.tried);
@@ -62,14 +62,9 @@ impl Refined {
         (steps + REFINE, true)
     }
 
-    /// Refines a hypothesis together with the whole body and returns its cost. Afterwards, `fit` holds its correspondences and
-    /// `matched` the previous ones.
-    pub(super) fn refine(&mut self, context: Context, fit: &mut Fit, hypothesis: &[Pose]) -> f64 {
-        self.refine_against(context, fit, hypothesis, None).1
-    }
-
-    /// Like [`Self::refine`], but stops early at the pose `rival`. Returns the number of ICP steps and the cost.
-    fn refine_against(
+    /// Refines a hypothesis together with the whole body, and stops early at the pose `rival`. Returns the number of ICP steps and
+    /// the cost. Afterwards, `fit` holds its correspondences and `matched` the previous ones.
+    pub(super) fn refine(
         &mut self,
         context: Context,
         fit: &mut Fit,

@@ -1,7 +1,7 @@
 //! Detections of the tracked person, or of any person while there is none: for the start of a track, for recovery of a lost body,
 //! and to verify a track.
 
-use super::detection_check::{ELSEWHERE, distance_cost};
+use super::detection_check::ELSEWHERE;
 use super::{Reasons, Relocalizer};
 use crate::body::Body;
 use crate::detect::{Detected, DetectionQuery, PlacedDetection, Surroundings};
@@ -11,12 +11,6 @@ use crate::observation::observer::Own;
 use crate::observation::ownership::OwnershipMask;
 
 impl Relocalizer {
-    /// Drops the detection of this frame if it is too far from a position, world frame, to be of a person who was tracked `elapsed`
-    /// seconds before.
-    pub(crate) fn forget_somebody_else(&mut self, root: Vec3, elapsed: f64) {
-        self.detection.take_if(|detection| distance_cost(detection.root.distance(root), elapsed).is_infinite());
-    }
-
     /// Drops the detection of this frame.
     pub(crate) fn forget(&mut self) {
         (self.detection, self.person_odds) = (None, None);
