@@ -24,9 +24,10 @@ pub(crate) struct Context<'a> {
 }
 
 impl<'a> Context<'a> {
-    /// Returns the body at `poses`, working frame, at the time of the frame.
+    /// Returns the frame and the body at these poses, working frame.
     pub(crate) fn posed(self, poses: &'a [Pose]) -> Posed<'a> {
-        Posed { body: &self.model.body, poses, previous: self.previous, origin: self.observation.origin() }
+        let (frame, origin) = (self.observation.frame(), self.observation.origin());
+        Posed { frame, body: &self.model.body, poses, previous: self.previous, origin }
     }
 
     /// Returns the context with fewer points, where there are many.

@@ -84,9 +84,8 @@ impl Hypotheses {
                 continue;
             }
             if by_colors {
-                let frame = context.observation.frame();
                 let is_other = |limb| chain.limbs().all(|own| own != limb);
-                fit.regions.draw(frame, context.posed(poses), is_other);
+                fit.regions.draw(context.posed(poses), is_other);
             }
             self.propose(Extremity::new(context, fit, poses, chain), detection);
             let (taken, better) = self.try_proposals(context, fit, poses, predicted);

@@ -96,7 +96,7 @@ impl Refined {
     pub(super) fn cost(&self, context: Context, fit: &mut Fit, poses: &[Pose]) -> f64 {
         let by_colors = context.compares_colors();
         if by_colors {
-            fit.regions.draw(context.observation.frame(), context.posed(poses), |_| true);
+            fit.regions.draw(context.posed(poses), |_| true);
         }
         let regions = by_colors.then_some(&fit.regions);
         Objective::new(context, fit.matched(poses), self.clutter, regions).body()

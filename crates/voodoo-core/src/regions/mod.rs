@@ -86,9 +86,11 @@ pub(crate) struct ColorRegions {
     camera_from_limb: Vec<Pose>,
 }
 
-/// The body at the time of a frame, in the working frame.
+/// A frame and the body at its time, in the working frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Posed<'a> {
+    /// The frame.
+    pub frame: &'a Frame<'a>,
     /// The body.
     pub body: &'a Body,
     /// Its poses.
@@ -172,12 +174,12 @@ impl ColorRegions {
     }
 
     /// Learns the colors of new cameras at the initial pose.
-    pub(crate) fn begin(&mut self, frame: &Frame, posed: Posed) {
+    pub(crate) fn begin(&mut self, posed: Posed) {
         if self.groups != posed.body.roles().groups() {
             posed.body.roles().groups().clone_into(&mut self.groups);
             self.cameras.iter_mut().for_each(|camera| camera.known = false);
         }
-        for picture in frame.colors {
+        for picture in posed.frame.colors {
             let kind = Kind::new(&picture.pixels);
             let groups = self.groups.iter().map(|group| usize::from(*group) + 1).max().unwrap_or(0);
             let camera = self.camera(picture.number);
@@ -187,7 +189,7 @@ impl ColorRegions {
             camera.model.clear(kind, groups);
             camera.known = true;
             self.evidence.clear();
-            self.place_lines(frame, picture, posed);
+            self.place_lines(picture, posed);
             self.teach(picture);
         }
     }
@@ -195,7 +197,6 @@ impl ColorRegions {
     /// Finds the edges of the limbs that are `is_requested` in all images, in this step of a frame.
     pub(crate) fn find(
         &mut self,
-        frame: &Frame,
         posed: Posed,
         step: usize,
         is_requested: impl Fn(usize) -> bool,
@@ -203,19 +204,18 @@ impl ColorRegions {
     ) {
         let search = SEARCHES[step.min(STEPS - 1)];
         reset(&mut self.evidence, posed.poses.len(), Evidence::default());
-        self.find_within(frame, posed, search, Some(&is_requested), &mut found.regions);
+        self.find_within(posed, search, Some(&is_requested), &mut found.regions);
         refill(&mut found.region_support, self.evidence.iter().map(Evidence::support));
     }
 
     /// Finds every edge on its own, for all limbs: where a limb is wider than modeled, the edges of both sides lie outward.
-    pub(crate) fn find_single_edges(&mut self, frame: &Frame, posed: Posed, pairs: &mut Vec<RegionPair>) {
-        self.find_within(frame, posed, SINGLE_EDGES, None, pairs);
+    pub(crate) fn find_single_edges(&mut self, posed: Posed, pairs: &mut Vec<RegionPair>) {
+        self.find_within(posed, SINGLE_EDGES, None, pairs);
     }
 
     /// Finds edges: of the requested limbs, with both sides searched together; or of all limbs, each edge on its own.
     fn find_within(
         &mut self,
-        frame: &Frame,
         posed: Posed,
         search: EdgeSearch,
         is_requested: Option<&dyn Fn(usize) -> bool>,
@@ -223,8 +223,8 @@ impl ColorRegions {
     ) {
         let together = is_requested.is_some();
         pairs.clear();
-        for picture in frame.colors {
-            self.place_lines(frame, picture, posed);
+        for picture in posed.frame.colors {
+            self.place_lines(picture, posed);
             let Self { cameras, groups, evidence, .. } = self;
             let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.number && camera.known) else {
                 continue;
@@ -295,8 +295,8 @@ impl ColorRegions {
     }
 
     /// Places the lines of one image.
-    fn place_lines(&mut self, frame: &Frame, picture: &ColorImage, posed: Posed) {
-        let limb = camera_from_limb_at(self.stamp, frame, picture, posed);
+    fn place_lines(&mut self, picture: &ColorImage, posed: Posed) {
+        let limb = camera_from_limb_at(self.stamp, picture, posed);
         let mut camera_from_limb = std::mem::take(&mut self.camera_from_limb);
         refill(&mut camera_from_limb, (0..posed.poses.len()).map(limb));
         let [fx, fy] = picture.camera.focal();
@@ -306,7 +306,7 @@ impl ColorRegions {
         lines.clear();
         // Reserves the full capacity at once: the number of lines differs from pose to pose.
         lines.reserve(2 * MOST_LINES * camera_from_limb.len());
-        let beside = OcclusionDepth::new(frame, picture);
+        let beside = OcclusionDepth::new(posed.frame, picture);
         let viewer = Viewer { body, camera: picture.camera, labels, unit: *unit, beside };
         for (limb, pose) in camera_from_limb.iter().enumerate() {
             let lines_a_side = (body.limbs()[limb].shape.length() / SPACING).round() as usize;

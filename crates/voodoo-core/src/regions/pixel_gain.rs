@@ -12,7 +12,6 @@ use crate::body::two_bone::TwoBone;
 use crate::camera::Camera;
 use crate::math::{Pose, Vec3, extrapolated, refill, shifted};
 use crate::observation::candidates::REFERENCE_PATCH;
-use crate::observation::frame::Frame;
 use crate::observation::picture::ColorImage;
 use crate::shape::TaperedEllipticCylinder;
 use crate::visibility::ALONG_LIMB;
@@ -24,12 +23,12 @@ const BACKDROP_BITS: u32 = 2;
 
 impl ColorRegions {
     /// Draws the `visible` limbs into the backdrop of each camera, which shows only them afterwards.
-    pub(crate) fn draw(&mut self, frame: &Frame, posed: Posed, visible: impl Fn(usize) -> bool) {
+    pub(crate) fn draw(&mut self, posed: Posed, visible: impl Fn(usize) -> bool) {
         let Self { backdrop, drawn, camera_from_limb, .. } = self;
         refill(drawn, (0..posed.poses.len()).map(&visible));
-        backdrop.resize_with(frame.colors.len(), LimbLabels::default);
-        for (picture, labels) in frame.colors.iter().zip(backdrop) {
-            let limb = camera_from_limb_at(self.stamp, frame, picture, posed);
+        backdrop.resize_with(posed.frame.colors.len(), LimbLabels::default);
+        for (picture, labels) in posed.frame.colors.iter().zip(backdrop) {
+            let limb = camera_from_limb_at(self.stamp, picture, posed);
             refill(camera_from_limb, (0..posed.poses.len()).map(limb));
             labels.draw(posed.body, camera_from_limb, picture.camera, BACKDROP_BITS, &visible);
         }
@@ -41,7 +40,7 @@ impl ColorRegions {
     ///
     /// What would be visible without it are the limbs that were drawn into the backdrop last. Of a limb that is drawn there itself,
     /// only the pixels count that show it, and nothing is known to be behind it.
-    pub(crate) fn pixel_gain(&self, frame: &Frame, posed: Posed, limb: usize) -> [f64; 2] {
+    pub(crate) fn pixel_gain(&self, posed: Posed, limb: usize) -> [f64; 2] {
         let is_drawn = self.drawn.get(limb).is_some_and(|drawn| *drawn);
         // What would be visible at a cell without the limb, which has this depth there; `None` where the limb is occluded.
         let behind = |(label, behind): (u16, f32), depth: f64| {
@@ -53,11 +52,11 @@ impl ColorRegions {
         let [mut gained, mut all] = [0.0; 2];
         let shape = &posed.body.limbs()[limb].shape;
         let group = usize::from(self.groups[limb]);
-        for (picture, labels) in frame.colors.iter().zip(&self.backdrop) {
+        for (picture, labels) in posed.frame.colors.iter().zip(&self.backdrop) {
             let known = self.cameras.iter().find(|camera| camera.number == picture.number && camera.known);
             let Some(camera) = known.filter(|camera| camera.model.knows(group)) else { continue };
             let view = camera.view(picture, labels, &self.groups);
-            let camera_from_limb = camera_from_limb_at(self.stamp, frame, picture, posed)(limb);
+            let camera_from_limb = camera_from_limb_at(self.stamp, picture, posed)(limb);
             places(shape, &camera_from_limb, picture.camera, |[u, v], depth, area| {
                 all += area;
                 let [width, height] = [picture.camera.width(), picture.camera.height()];
@@ -73,22 +72,16 @@ impl ColorRegions {
                 }
             });
         }
-        let cameras = frame.colors.len().max(1) as f64;
+        let cameras = posed.frame.colors.len().max(1) as f64;
         [gained / cameras, all / cameras]
     }
 
     /// Writes to `supports` what every limb of the arms and legs explains that no limb outside its own arm or leg does.
-    pub(crate) fn pixel_gains(
-        &mut self,
-        frame: &Frame,
-        posed: Posed,
-        chains: &[TwoBone],
-        supports: &mut [RegionSupport],
-    ) {
+    pub(crate) fn pixel_gains(&mut self, posed: Posed, chains: &[TwoBone], supports: &mut [RegionSupport]) {
         for chain in chains {
-            self.draw(frame, posed, |limb| chain.limbs().all(|own| own != limb));
+            self.draw(posed, |limb| chain.limbs().all(|own| own != limb));
             for limb in chain.limbs() {
-                [supports[limb].gained, supports[limb].area] = self.pixel_gain(frame, posed, limb);
+                [supports[limb].gained, supports[limb].area] = self.pixel_gain(posed, limb);
             }
         }
     }
@@ -97,9 +90,8 @@ impl ColorRegions {
 /// The limbs' poses in a camera's frame at the time of its image; `last` is the time of the last frame.
 pub(super) fn camera_from_limb_at<'a>(
     last: Option<f64>,
-    frame: &Frame,
     picture: &ColorImage,
-    Posed { poses, previous, origin, .. }: Posed<'a>,
+    Posed { frame, poses, previous, origin, .. }: Posed<'a>,
 ) -> impl Fn(usize) -> Pose + use<'a> {
     // Time from the frame to the image, as a fraction of the interval of the last motion.
     let passed = last.map_or(f64::INFINITY, |last| frame.stamp - last);

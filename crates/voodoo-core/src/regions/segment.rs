@@ -7,7 +7,6 @@ use super::histogram::bin_of;
 use super::labels::NOTHING;
 use super::{ColorRegions, Posed};
 use crate::association::correspondence::Correspondences;
-use crate::observation::frame::Frame;
 use crate::observation::picture::ColorImage;
 
 /// Log odds fall by one per this many units outward from the contour.
@@ -22,20 +21,20 @@ const CHAMFER: [f32; 2] = [1.0, 1.414];
 impl ColorRegions {
     /// Probability that each pixel of a frame's images shows the body, image after image, row by row, in [0, 1]. New cameras
     /// first learn its colors at this pose.
-    pub(crate) fn segment(&mut self, frame: &Frame, posed: Posed) -> Vec<Vec<f32>> {
-        self.begin(frame, posed);
-        frame.colors.iter().map(|picture| self.segment_picture(frame, picture, posed)).collect()
+    pub(crate) fn segment(&mut self, posed: Posed) -> Vec<Vec<f32>> {
+        self.begin(posed);
+        posed.frame.colors.iter().map(|picture| self.segment_picture(picture, posed)).collect()
     }
 
     /// Learns the colors of the body and its surroundings at this pose.
-    pub(crate) fn learn_at(&mut self, frame: &Frame, posed: Posed) {
-        self.begin(frame, posed);
-        self.find(frame, posed, 0, |_| true, &mut Correspondences::default());
-        self.learn(frame);
+    pub(crate) fn learn_at(&mut self, posed: Posed) {
+        self.begin(posed);
+        self.find(posed, 0, |_| true, &mut Correspondences::default());
+        self.learn(posed.frame);
     }
 
-    fn segment_picture(&mut self, frame: &Frame, picture: &ColorImage, posed: Posed) -> Vec<f32> {
-        self.place_lines(frame, picture, posed);
+    fn segment_picture(&mut self, picture: &ColorImage, posed: Posed) -> Vec<f32> {
+        self.place_lines(picture, posed);
         let [width, height] = [picture.camera.width(), picture.camera.height()];
         let mut likely = vec![0.0; width * height];
         let Some(camera) = self.cameras.iter().find(|camera| camera.number == picture.number) else { return likely };

@@ -41,7 +41,7 @@ impl Term for Regions<'_> {
 
     fn cost(&self, body: &Body, poses: &[Pose], limb: usize) -> f64 {
         let Some(Colors { regions, frame, previous, origin }) = self.colors else { return 0.0 };
-        let [gained, _] = regions.pixel_gain(frame, Posed { body, poses, previous, origin }, limb);
+        let [gained, _] = regions.pixel_gain(Posed { frame, body, poses, previous, origin }, limb);
         -PATCH * gained
     }
 }

@@ -311,7 +311,7 @@ impl BodyTracker {
         sizes.set_radius_sigmas(&model.body, fit);
         // Sizes from the first frame, then warm start and ICP steps (steps 2 to 7).
         let mut steps = 0;
-        fit.regions.begin(frame, setting.with_model(model).posed(poses));
+        fit.regions.begin(setting.with_model(model).posed(poses));
         if config.hypotheses && whole_body && known {
             steps += hypotheses.branch.follow(setting.with_model(model), fit);
         }

@@ -36,13 +36,13 @@ impl BodyTracker {
     /// after picture, row by row. The body is at `poses` (world frame), or at its current poses with `None`. Cameras without
     /// learned colors learn them at these poses.
     pub fn segment(&mut self, frame: &Frame, poses: Option<&[Pose]>) -> Result<Vec<Vec<f32>>, TrackError> {
-        self.at_poses(frame, poses, |regions, posed| regions.segment(frame, posed))
+        self.at_poses(frame, poses, ColorRegions::segment)
     }
 
     /// Learns the body's colors in a frame's pictures, with the body at `poses` (world frame), or at its current poses with
     /// `None`.
     pub fn learn_colors(&mut self, frame: &Frame, poses: Option<&[Pose]>) -> Result<(), TrackError> {
-        self.at_poses(frame, poses, |regions, posed| regions.learn_at(frame, posed))
+        self.at_poses(frame, poses, ColorRegions::learn_at)
     }
 
     fn at_poses<R>(
@@ -58,7 +58,7 @@ impl BodyTracker {
         self.fit.regions.check(frame)?;
         let current: Vec<Pose> = self.motion.world_from_limb().collect();
         let (body, previous, origin) = (&self.model.body, &[][..], Vec3::ZERO);
-        Ok(work(&mut self.fit.regions, Posed { body, poses: poses.unwrap_or(&current), previous, origin }))
+        Ok(work(&mut self.fit.regions, Posed { frame, body, poses: poses.unwrap_or(&current), previous, origin }))
     }
 
     /// Returns the body in its current sizes.
