@@ -432,7 +432,7 @@ impl BodyTracker {
         (estimate.stamp, estimate.steps) = (stamp, steps);
         let Some(time_scale) = time_scale else {
             assessor.report_status(model, estimate);
-            assessor.forget_edges();
+            assessor.edges.forget();
             uncertainty.forget();
             estimate.covariances.forget(&model.body);
             return;

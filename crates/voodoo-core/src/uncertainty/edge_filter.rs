@@ -40,6 +40,11 @@ impl EdgeFilter {
         self.sigma.clear();
     }
 
+    /// Whether a frame was observed since the pose was set.
+    pub(crate) fn is_known(&self) -> bool {
+        !self.known.is_empty()
+    }
+
     /// Standard deviation of the position of a limb's distal end after the last frame, meters; infinite where it is not known.
     pub(crate) fn end_sigma(&self, limb: usize) -> f64 {
         self.sigma.get(limb).copied().unwrap_or(f64::INFINITY)

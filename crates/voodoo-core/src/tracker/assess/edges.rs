@@ -17,11 +17,10 @@ impl Assessor {
         let FittedPose { model, correspondences, .. } = found;
         let points = correspondences.limbs.iter().any(|matches| !matches.candidate.is_empty());
         let pictures = !correspondences.region_support.is_empty();
-        if points || !pictures && !self.by_edges {
-            self.forget_edges();
+        if points || !pictures && !self.edges.is_known() {
+            self.edges.forget();
             return;
         }
-        self.by_edges = true;
         self.edges.observe(found);
         let Self { edges, log_odds, .. } = self;
         for chain in &model.extremities {
@@ -38,12 +37,6 @@ impl Assessor {
             }
             chain.ends.iter().for_each(|end| log_odds[*end] = log_odds[chain.lower]);
         }
-    }
-
-    /// Discards all evidence from color edges.
-    pub(in crate::tracker) fn forget_edges(&mut self) {
-        self.edges.forget();
-        self.by_edges = false;
     }
 }
 
@@ -90,7 +83,7 @@ mod tests {
         let mut assessor = Assessor { log_odds: vec![f64::NAN; poses.len()], ..Assessor::default() };
         follow(&mut assessor, &model, &poses, &edges_of(&model, &poses, information), apart);
         let arm = &model.extremities[first_arm(&model)];
-        assert!(assessor.by_edges && assessor.log_odds[0].is_nan(), "the trunk's odds are kept");
+        assert!(assessor.edges.is_known() && assessor.log_odds[0].is_nan(), "the trunk's odds are kept");
         [arm.upper, arm.lower, arm.ends[0]].map(|limb| assessor.log_odds[limb])
     }
 
@@ -112,8 +105,10 @@ mod tests {
         let (model, poses) = standing();
         let mut correspondences = edges_of(&model, &poses, 5e3);
         correspondences.limbs.push(LimbMatches { candidate: vec![0], ..LimbMatches::default() });
-        let mut assessor = Assessor { by_edges: true, log_odds: vec![2.0; poses.len()], ..Assessor::default() };
+        let mut assessor = Assessor { log_odds: vec![2.0; poses.len()], ..Assessor::default() };
+        follow(&mut assessor, &model, &poses, &edges_of(&model, &poses, 5e3), None);
+        let before = assessor.log_odds.clone();
         follow(&mut assessor, &model, &poses, &correspondences, None);
-        assert_eq!((assessor.by_edges, assessor.log_odds), (false, vec![2.0; poses.len()]));
+        assert_eq!((assessor.edges.is_known(), assessor.log_odds), (false, before));
     }
 }

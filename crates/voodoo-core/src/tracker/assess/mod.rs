@@ -70,9 +70,8 @@ pub(super) struct Assessor {
     exclusive: Exclusive,
     raycasters: Vec<LimbRaycaster>,
     supports: Vec<LimbSupport>,
-    edges: EdgeFilter,
-    /// Whether color edges are the only evidence.
-    by_edges: bool,
+    /// Evidence of color edges, where these are the only evidence.
+    pub(super) edges: EdgeFilter,
 }
 
 impl Assessor {
@@ -160,7 +159,7 @@ impl Assessor {
         refill(statuses, self.limbs.iter().zip(&self.log_odds).map(|(limb, log_odds)| limb.status(*log_odds)));
         let [even, factor] = WITHIN_10_CM;
         refill(probabilities, self.log_odds.iter().map(|log_odds| probability(even + factor * log_odds)));
-        let status = if self.by_edges { overall(statuses, |_| true) } else { self.status };
+        let status = if self.edges.is_known() { overall(statuses, |_| true) } else { self.status };
         // Nothing may match a pose that was set, however much was measured.
         let sources = &estimate.sources;
         let missed = sources.iter().any(|source| source.residual > MISSED)
