@@ -167,20 +167,14 @@ impl LimbRaycaster {
     /// Prepares the intersection of a camera's rays with a limb of this shape.
     pub(crate) fn new(shape: TaperedEllipticCylinder, limb_from_sensor: Pose) -> Self {
         let sensor_from_limb = limb_from_sensor.inverse();
-        let mut corners = Some([[0.0; 2]; 8]);
         let (mut low, mut high) = ([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
-        for index in 0..8 {
-            let (a, b, z) = match index & 4 {
-                0 => (shape.a0(), shape.b0(), 0.0),
-                _ => (shape.a1(), shape.b1(), shape.length()),
-            };
+        let places: [Vec3; 8] = std::array::from_fn(|index| {
+            let end = shape.ends()[index / 4];
             let sign = |bit: usize| if index & bit == 0 { 1.0 } else { -1.0 };
-            let corner = sensor_from_limb * Vec3::new(sign(1) * a, sign(2) * b, z);
-            corners = corners.filter(|_| corner.z > PRECISION);
-            if let Some(corners) = &mut corners {
-                corners[index] = [corner.x / corner.z, corner.y / corner.z];
-            }
-        }
+            sensor_from_limb * Vec3::new(sign(1) * end.a, sign(2) * end.b, end.z)
+        });
+        let seen = places.iter().all(|place| place.z > PRECISION);
+        let corners = seen.then(|| places.map(|place| [place.x / place.z, place.y / place.z]));
         if let Some(corners) = &corners {
             for axis in 0..2 {
                 let values = || corners.iter().map(|corner| corner[axis]);
