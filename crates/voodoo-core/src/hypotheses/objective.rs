@@ -41,9 +41,8 @@ impl<'a> Objective<'a> {
         clutter: f64,
         regions: Option<&'a ColorRegions>,
     ) -> Self {
-        let Context { model, observation, config, previous, .. } = context;
-        let (frame, origin) = (observation.frame(), observation.origin());
-        let colors = regions.map(|regions| Colors { regions, frame, previous, origin });
+        let Context { model, observation, config, .. } = context;
+        let colors = regions.map(|regions| Colors { regions, posed: context.posed(matched.poses) });
         let Matched { correspondences, .. } = matched;
         let information = 1.0 / (config.point_sigma * config.point_sigma);
         let (tangential_weight, scale) = (config.tangential_weight, config.kernel_end);

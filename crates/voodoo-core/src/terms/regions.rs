@@ -3,8 +3,7 @@
 use super::{PATCH, Term};
 use crate::association::correspondence::RegionPair;
 use crate::body::Body;
-use crate::math::{Pose, Vec3};
-use crate::observation::frame::Frame;
+use crate::math::Pose;
 use crate::regions::{ColorRegions, Posed};
 use crate::terms::normal_equations::{NormalEquations, line};
 
@@ -22,12 +21,8 @@ pub(crate) struct Regions<'a> {
 pub(crate) struct Colors<'a> {
     /// What is known of the colors, and the limbs drawn last: the whole body, or those that are not compared.
     pub regions: &'a ColorRegions,
-    /// The frame.
-    pub frame: &'a Frame<'a>,
-    /// The poses of the previous frame, working frame.
-    pub previous: &'a [Pose],
-    /// The working frame's origin in the world.
-    pub origin: Vec3,
+    /// The frame, and the body as it was matched to it.
+    pub posed: Posed<'a>,
 }
 
 impl Term for Regions<'_> {
@@ -40,8 +35,8 @@ impl Term for Regions<'_> {
     }
 
     fn cost(&self, body: &Body, poses: &[Pose], limb: usize) -> f64 {
-        let Some(Colors { regions, frame, previous, origin }) = self.colors else { return 0.0 };
-        let [gained, _] = regions.pixel_gain(Posed { frame, body, poses, previous, origin }, limb);
+        let Some(Colors { regions, posed }) = self.colors else { return 0.0 };
+        let [gained, _] = regions.pixel_gain(Posed { body, poses, ..posed }, limb);
         -PATCH * gained
     }
 }
