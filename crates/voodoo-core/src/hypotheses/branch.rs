@@ -146,8 +146,7 @@ mod tests {
             branch.motion.restart(other.to_vec());
             fit.match_last(context, first);
             let (mut poses, mut predicted) = (first.to_vec(), first.to_vec());
-            let mut refined = Refined::default();
-            refined.clutter = 1.0;
+            let mut refined = Refined { clutter: 1.0, ..Refined::default() };
             let steps = branch.compare(context, &mut refined, &mut fit, &mut poses, &mut predicted);
             let arm = &model.extremities[first_arm(&model)];
             assert_eq!(poses == first, predicted == first, "poses and prediction change together");
