@@ -63,7 +63,9 @@ impl Estimate {
             report.count += 1;
             report.add(pair.information, pair.distance * pair.distance);
         }
-        sources.iter_mut().for_each(SourceReport::finish);
+        for source in sources {
+            source.residual = (source.residual / source.weight).sqrt();
+        }
     }
 }
 
@@ -76,15 +78,11 @@ fn entry(sources: &mut Vec<SourceReport>, source: u16) -> &mut SourceReport {
 }
 
 impl SourceReport {
-    /// Counts one matched measurement; `residual` holds the weighted sum until `finish`.
+    /// Counts one matched measurement; `residual` holds the weighted sum until all are counted.
     fn add(&mut self, weight: f64, square: f64) {
         self.inliers += 1;
         self.weight += weight;
         self.residual += weight * square;
-    }
-
-    fn finish(&mut self) {
-        self.residual = (self.residual / self.weight).sqrt();
     }
 }
 
