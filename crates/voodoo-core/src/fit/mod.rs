@@ -100,11 +100,7 @@ impl Fit {
 
     /// Clears the correspondences.
     pub(crate) fn clear(&mut self) {
-        self.correspondences.limbs.clear();
-        self.correspondences.sites.clear();
-        self.correspondences.contour.clear();
-        self.correspondences.regions.clear();
-        self.correspondences.region_support.clear();
+        self.correspondences = Correspondences::default();
         self.radius_variances.clear();
         self.regions.clear();
     }
@@ -117,11 +113,7 @@ impl Fit {
         let mut steps = 0;
         let mut before = f64::INFINITY;
         while steps < context.config.max_steps {
-            if kind.reassociates(steps) {
-                self.match_all(context, poses, steps);
-            } else {
-                self.match_again(context, poses, steps);
-            }
+            self.match_all(context, poses, steps, kind.reassociates(steps));
             let distance = self.correspondences.mean_squared_distance().unwrap_or(0.0);
             self.solve(context, predicted, poses, steps);
             steps += 1;
@@ -137,17 +129,19 @@ impl Fit {
         steps
     }
 
-    /// Steps 2 to 5 at `poses`: turns all measurements into correspondences.
-    pub(crate) fn match_all(&mut self, context: Context, poses: &[Pose], step: usize) {
+    /// Steps 2 to 5 at `poses`: turns all measurements into correspondences; `anew` states whether points are assigned to limbs, and
+    /// contours to edges, anew.
+    pub(crate) fn match_all(&mut self, context: Context, poses: &[Pose], step: usize, anew: bool) {
         let gate = Gate::new(context.config, step);
-        // 2 Assign points to limbs.
-        self.assign(context, poses, &gate);
-        if step >= CONTOUR_FROM {
-            self.find_contour(context, poses);
-        } else {
+        if anew {
+            // 2 Assign points to limbs.
+            self.assign(context, poses, &gate);
             self.contours.clear();
+            if step >= CONTOUR_FROM {
+                self.find_contour(context, poses);
+            }
         }
-        self.match_assigned(context, poses, &gate, true);
+        self.match_assigned(context, poses, &gate, anew);
         self.find_regions(context, poses, step);
     }
 
@@ -203,7 +197,7 @@ impl Fit {
         let is_whole_body = context.config.solver.is_whole_body();
         for round in 0.. {
             if named && !is_whole_body {
-                self.match_all(context, poses, 0);
+                self.match_all(context, poses, 0, true);
             } else {
                 self.match_sites(context, poses);
             }
@@ -215,13 +209,6 @@ impl Fit {
                 break;
             }
         }
-    }
-
-    /// Steps 3 to 5 with unchanged assignments of points to limbs and of contours to edges.
-    pub(crate) fn match_again(&mut self, context: Context, poses: &[Pose], step: usize) {
-        let gate = Gate::new(context.config, step);
-        self.match_assigned(context, poses, &gate, false);
-        self.find_regions(context, poses, step);
     }
 
     fn match_assigned(&mut self, context: Context, poses: &[Pose], gate: &Gate, anew: bool) {
@@ -347,11 +334,11 @@ mod tests {
         let (pixels, config) = (before_wall(&model.body, &poses), Config::default());
         with_context(&pixels, &config, &model, &poses, |context| {
             let mut fit = Fit::new(&config).unwrap();
-            fit.match_all(context, &poses, config.max_steps);
+            fit.match_all(context, &poses, config.max_steps, true);
             let written = |fit: &Fit| format!("{:?}", fit.correspondences);
             let (before, mut matched) = (written(&fit), Correspondences::default());
             fit.swap_matches(&mut matched);
-            fit.match_all(context, &moved(&poses, 0.05 * Vec3::X), config.max_steps);
+            fit.match_all(context, &moved(&poses, 0.05 * Vec3::X), config.max_steps, true);
             assert_ne!(written(&fit), before);
             fit.swap_matches(&mut matched);
             assert_eq!(written(&fit), before);

@@ -81,11 +81,7 @@ impl Refined {
             let at = (context.config.max_steps + 1 + step).saturating_sub(REFINE);
             let here = if step < ROUGH_STEPS { context.subsampled() } else { context };
             // After the first half of the steps, every second step keeps the assignment of points to limbs where possible.
-            if step.is_multiple_of(2) || 2 * step < REFINE {
-                fit.match_all(here, &self.poses, at);
-            } else {
-                fit.match_again(here, &self.poses, at);
-            }
+            fit.match_all(here, &self.poses, at, step.is_multiple_of(2) || 2 * step < REFINE);
             fit.solve(here, hypothesis, &mut self.poses, at);
         }
         fit.match_last(context, &self.poses);

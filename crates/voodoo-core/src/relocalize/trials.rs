@@ -27,7 +27,7 @@ pub(super) struct Trials {
 impl Trials {
     /// Tries the body at the poses `place`. Returns whether it explains the points there better than the present pose does.
     pub(super) fn try_at(&mut self, context: Context, fit: &mut Fit, present: &[Pose], place: &[Pose]) -> bool {
-        fit.match_all(context, present, context.config.max_steps);
+        fit.match_all(context, present, context.config.max_steps, true);
         let present_cost = Objective::new(context, fit.matched(present), 1.0, None).body();
         self.refine(context, fit, place) < present_cost
     }
@@ -84,10 +84,10 @@ impl Trials {
         refill(poses, place.iter().copied());
         predicted.clone_from(poses);
         for step in 0..REFINE {
-            fit.match_all(context, poses, step);
+            fit.match_all(context, poses, step, true);
             fit.solve(context, predicted, poses, step);
         }
-        fit.match_all(context, poses, context.config.max_steps);
+        fit.match_all(context, poses, context.config.max_steps, true);
         Objective::new(context, fit.matched(poses), 1.0, None).body()
     }
 }

@@ -414,7 +414,7 @@ impl BodyTracker {
         observer.gather(frame, *origin, &bounds, ownership, config);
         let observation = observer.observation(frame, *origin, ownership);
         let setting = Setting { config, observation, previous, time_scale: 1.0 };
-        fit.match_all(setting.with_model(model), poses, config.max_steps);
+        fit.match_all(setting.with_model(model), poses, config.max_steps, true);
         assessor.moved();
         assessor.assess(setting.with_model(model), fit.matched(poses), None);
     }
