@@ -129,8 +129,8 @@ impl Fit {
         steps
     }
 
-    /// Steps 2 to 5 at `poses`: turns all measurements into correspondences; `anew` states whether points are assigned to limbs, and
-    /// contours to edges, anew.
+    /// Steps 2 to 5 at `poses`: turns all measurements into correspondences; `anew` states whether points are assigned to limbs,
+    /// and contours to edges, anew.
     pub(crate) fn match_all(&mut self, context: Context, poses: &[Pose], step: usize, anew: bool) {
         let gate = Gate::new(context.config, step);
         if anew {

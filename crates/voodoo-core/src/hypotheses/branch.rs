@@ -31,8 +31,8 @@ pub(crate) struct Branch {
 }
 
 impl Branch {
-    /// Fits the second branch to a frame of few color images, before the body itself is fitted. Afterwards, `fit` holds its correspondences. Returns
-    /// the number of ICP steps.
+    /// Fits the second branch to a frame of few color images, before the body itself is fitted. Afterwards, `fit` holds its
+    /// correspondences. Returns the number of ICP steps.
     pub(crate) fn follow(&mut self, context: Context, fit: &mut Fit) -> usize {
         let Self { motion, poses, predicted, previous, .. } = self;
         if !is_enabled(context) || motion.poses.len() != context.model.body.limbs().len() {

@@ -168,7 +168,8 @@ impl Hypotheses {
         }
     }
 
-    /// Refines the proposals and accepts those that explain the frame better. Returns the number of ICP steps, and whether the pose has changed.
+    /// Refines the proposals and accepts those that explain the frame better. Returns the number of ICP steps, and whether the pose
+    /// has changed.
     fn try_proposals(
         &mut self,
         context: Context,

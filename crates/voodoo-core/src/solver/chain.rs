@@ -17,6 +17,11 @@ pub(crate) struct ChainSolver {
     pub(super) composite: Vec<(Matrix6<f64>, Vector6<f64>)>,
     pub(super) h: Vec<f64>,
     pub(super) step: Vec<f64>,
+    /// Of the relative lengths of pairs of limbs: mixed second derivatives with the pose unknowns, one row per pair; second
+    /// derivatives; and gradient.
+    pub(super) mixed: Vec<f64>,
+    pub(super) reduced: Vec<f64>,
+    pub(super) gradient: Vec<f64>,
 }
 
 impl ChainSolver {
@@ -29,7 +34,7 @@ impl ChainSolver {
     }
 
     pub(super) fn assemble(&mut self, body: &Body, normal: &NormalEquations, poses: &[Pose], damping: f64) {
-        let Self { chain, screws, composite, h, step } = self;
+        let Self { chain, screws, composite, h, step, .. } = self;
         chain.layout(body);
         let n = chain.freedoms;
         list_screws(body, poses, screws);

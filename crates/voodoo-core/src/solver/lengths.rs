@@ -3,19 +3,9 @@
 use nalgebra::Vector6;
 
 use super::{ChainSolver, LENGTH_INFORMATION};
-use crate::body::kinematics::Chain;
 use crate::body::{Body, Pair};
 use crate::math::{Pose, Vec3, dot, factor, half_substitute, reset, solve_in_place};
 use crate::terms::normal_equations::NormalEquations;
-
-/// Working memory.
-#[derive(Debug, Default)]
-pub(crate) struct Lengths {
-    /// Mixed second derivatives: per pair, one row over all pose unknowns.
-    mixed: Vec<f64>,
-    reduced: Vec<f64>,
-    gradient: Vec<f64>,
-}
 
 impl ChainSolver {
     /// Writes the relative change of length of each pair to `change`: the Gauss-Newton step of the lengths after elimination of
@@ -28,58 +18,45 @@ impl ChainSolver {
         pairs: &[Pair],
         pull: &[f64],
         change: &mut [f64],
-        work: &mut Lengths,
     ) -> bool {
         self.assemble(body, normal, poses, 0.0);
-        work.couple(self, body, poses, pairs);
-        if !work.eliminate(self, pairs.len()) {
+        self.couple(body, poses, pairs);
+        let count = pairs.len();
+        if !self.eliminate(count) {
             return false;
         }
-        let count = pairs.len();
         for row in 0..count {
-            work.reduced[row * count + row] += LENGTH_INFORMATION[0] + pull[row];
-            change[row] = pull[row] * change[row] - work.gradient[row];
+            self.reduced[row * count + row] += LENGTH_INFORMATION[0] + pull[row];
+            change[row] = pull[row] * change[row] - self.gradient[row];
         }
-        solve_in_place(&mut work.reduced, change, count)
+        solve_in_place(&mut self.reduced, change, count)
     }
-}
 
-/// Twist of a limb when its parent lengthens: a translation along the parent's axis, as of a sliding joint.
-fn slide(body: &Body, poses: &[Pose], limb: usize) -> Vector6<f64> {
-    let Some((parent, joint)) = &body.limbs()[limb].parent else { return Vector6::zeros() };
-    let own = body.limbs()[*parent].parent.as_ref().map_or(0.0, |(_, joint)| joint.limb_from_joint.translation.z);
-    let v = poses[*parent].rotation * Vec3::Z * (joint.parent_from_joint.translation.z - own);
-    Vector6::new(0.0, 0.0, 0.0, v.x, v.y, v.z)
-}
-
-impl Lengths {
     /// Writes the information of the relative length of each of `pairs` on its own to `information`, with the pose unknowns
     /// eliminated. Uses the factorization of [`super::Spread::factor`].
-    pub(crate) fn information(
+    pub(crate) fn length_information(
         &mut self,
-        solver: &ChainSolver,
         body: &Body,
         poses: &[Pose],
         pairs: &[Pair],
         information: &mut Vec<f64>,
     ) {
-        self.couple(solver, body, poses, pairs);
-        let (n, count) = (solver.chain.freedoms, pairs.len());
-        let Self { mixed, reduced, .. } = self;
+        self.couple(body, poses, pairs);
+        let Self { chain, h, mixed, reduced, .. } = self;
+        let (n, count) = (chain.freedoms, pairs.len());
         information.clear();
         for row in 0..count {
             let own = &mut mixed[row * n..(row + 1) * n];
-            half_substitute(&solver.h, own, n);
+            half_substitute(h, own, n);
             // A NaN leaves no information.
             information.push((reduced[row * count + row] - dot(own, own)).max(0.0));
         }
     }
 
     /// Computes second derivatives and gradient of the lengths, and the mixed derivatives with the pose unknowns.
-    fn couple(&mut self, solver: &ChainSolver, body: &Body, poses: &[Pose], pairs: &[Pair]) {
-        let ChainSolver { chain, screws, composite, .. } = solver;
+    fn couple(&mut self, body: &Body, poses: &[Pose], pairs: &[Pair]) {
+        let Self { chain, screws, composite, mixed, reduced, gradient, .. } = self;
         let (n, count) = (chain.freedoms, pairs.len());
-        let Self { mixed, reduced, gradient, .. } = self;
         reset(mixed, count * n, 0.0);
         reset(reduced, count * count, 0.0);
         reset(gradient, count, 0.0);
@@ -114,10 +91,10 @@ impl Lengths {
     }
 
     /// Eliminates the pose unknowns; returns false when their matrix is not positive definite.
-    fn eliminate(&mut self, solver: &mut ChainSolver, count: usize) -> bool {
+    fn eliminate(&mut self, count: usize) -> bool {
         // `step` holds the negative gradient of the pose unknowns.
-        let ChainSolver { chain: Chain { freedoms: n, .. }, h, step, .. } = solver;
-        let (n, Self { mixed, reduced, gradient }) = (*n, self);
+        let Self { chain, h, step, mixed, reduced, gradient, .. } = self;
+        let n = chain.freedoms;
         if !factor(h, n) {
             return false;
         }
@@ -134,4 +111,12 @@ impl Lengths {
         }
         true
     }
+}
+
+/// Twist of a limb when its parent lengthens: a translation along the parent's axis, as of a sliding joint.
+fn slide(body: &Body, poses: &[Pose], limb: usize) -> Vector6<f64> {
+    let Some((parent, joint)) = &body.limbs()[limb].parent else { return Vector6::zeros() };
+    let own = body.limbs()[*parent].parent.as_ref().map_or(0.0, |(_, joint)| joint.limb_from_joint.translation.z);
+    let v = poses[*parent].rotation * Vec3::Z * (joint.parent_from_joint.translation.z - own);
+    Vector6::new(0.0, 0.0, 0.0, v.x, v.y, v.z)
 }

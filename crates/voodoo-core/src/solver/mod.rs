@@ -11,7 +11,6 @@ mod warm_start;
 mod whole_body;
 
 pub(crate) use chain::ChainSolver;
-pub(crate) use lengths::Lengths;
 pub(crate) use limbwise::Limbwise;
 pub(crate) use schedule::Gate;
 pub(crate) use spread::Spread;

@@ -1,6 +1,5 @@
 //! Solves for all limbs at once: sums the terms into one system, which the chain or the tree solves.
 
-use super::lengths::Lengths;
 use super::schedule::narrowed;
 use super::{ChainSolver, LIMIT_SIGMA, Problem, TreeSolver, WarmStart};
 use crate::body::{JointKind, Pair};
@@ -46,7 +45,6 @@ pub(crate) struct WholeBody {
     chain: ChainSolver,
     /// Solves for the limbs instead of the chain, with elastic bands at the joints.
     tree: TreeSolver,
-    lengths: Lengths,
     warm_start: WarmStart,
     joint_sigmas: Vec<f64>,
     /// Where joints rest that nothing shows.
@@ -94,8 +92,7 @@ impl WholeBody {
         change: &mut [f64],
     ) -> bool {
         self.sum_terms(problem, poses, false);
-        let Self { normal, chain, lengths, .. } = self;
-        chain.lengths(problem.body, normal, poses, pairs, pull, change, lengths)
+        self.chain.lengths(problem.body, &self.normal, poses, pairs, pull, change)
     }
 
     /// Warm start: follows the named sites before the first step of a frame. Returns true to request another round.

@@ -18,7 +18,7 @@ use crate::body::{Model, Pair};
 use crate::config::Config;
 use crate::math::{Pose, Vec3};
 use crate::sizes::girth::ALIKE;
-use crate::solver::{LENGTH_INFORMATION, Lengths, SITE_SCALE, Spread};
+use crate::solver::{LENGTH_INFORMATION, SITE_SCALE, Spread};
 use crate::terms::{Measurements, Term};
 
 /// Maximum number of surface points per meter of limb with independent errors.
@@ -44,7 +44,6 @@ pub(crate) struct Uncertainty {
     /// Information of the relative length of every pair of limbs: accumulated since the pose was set, and of this frame.
     known: Vec<f64>,
     length_information: Vec<f64>,
-    work: Lengths,
 }
 
 /// A frame's pose and the measurements that support it.
@@ -115,8 +114,8 @@ impl Uncertainty {
 
     /// Adds the frame's information on the limbs' lengths; errors of successive frames are correlated.
     fn learn_lengths(&mut self, found: FittedPose) {
-        let Self { spread, known, length_information, work, .. } = self;
-        work.information(&spread.system, &found.model.body, found.poses, found.pairs, length_information);
+        let Self { spread, known, length_information, .. } = self;
+        spread.system.length_information(&found.model.body, found.poses, found.pairs, length_information);
         known.resize(found.pairs.len(), LENGTH_INFORMATION[1]);
         for (known, length_information) in known.iter_mut().zip(length_information) {
             *known += *length_information / ALIKE;

@@ -88,7 +88,7 @@ impl Assessor {
         self.status = status;
     }
 
-    /// Restarts the evidence after the body was moved, or its pose set by somebody else than the user: only the current frame counts.
+    /// Restarts the evidence after the body was moved, or where the user did not set its pose: only the current frame counts.
     pub(super) fn moved(&mut self) {
         self.limbs.clear();
         self.round = [ROUND[1]; 2];
