@@ -19,7 +19,7 @@ use crate::detect::{Detected, DetectedLimbs, MeasuredJoint};
 use crate::error::TrackError;
 use crate::math::{Pose, Vec3, refill};
 use crate::regions;
-use crate::solver::{Gate, Limbwise, Problem, WholeBody};
+use crate::solver::{Gate, Problem, WarmStart, WholeBody, solve_limbwise};
 use crate::threads::Threads;
 
 /// First step of a frame that uses the depth contour: in earlier steps, it would push thin limbs off their points (method section
@@ -29,8 +29,7 @@ pub(crate) const CONTOUR_FROM: usize = 2;
 /// Fits the pose to a frame, starting from a nearby pose. Keeps the last correspondences.
 #[derive(Debug)]
 pub(crate) struct Fit {
-    /// The solvers, of which the configuration chooses one.
-    limbwise: Limbwise,
+    warm_start: WarmStart,
     whole_body: WholeBody,
     assignment: Assignment,
     buried: Buried,
@@ -53,7 +52,7 @@ impl Fit {
     /// Starts the threads of a configuration.
     pub(crate) fn new(config: &Config) -> Result<Self, TrackError> {
         Ok(Self {
-            limbwise: Limbwise::default(),
+            warm_start: WarmStart::default(),
             whole_body: WholeBody::default(),
             assignment: Assignment::default(),
             buried: Buried::default(),
@@ -108,7 +107,7 @@ impl Fit {
     /// Runs a warm start, then steps 2 to 7 until they converge; the correspondences at the end are those at the fitted poses.
     /// Returns the number of steps.
     pub(crate) fn run(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose]) -> usize {
-        self.warm_start(context, poses);
+        self.follow_sites(context, poses);
         let kind = context.config.solver;
         let mut steps = 0;
         let mut before = f64::INFINITY;
@@ -190,22 +189,18 @@ impl Fit {
         context.config.solver.is_whole_body() && whole_body.lengths(&problem, poses, pairs, pull, change)
     }
 
-    /// Passes the measured positions of named sites to the solver before the frame's steps.
-    fn warm_start(&mut self, context: Context, poses: &mut [Pose]) {
+    /// Warm start: follows the measured positions of named sites before the frame's steps.
+    fn follow_sites(&mut self, context: Context, poses: &mut [Pose]) {
         let frame = context.observation.frame();
         let named = !frame.positions.is_empty() || !frame.rays.is_empty();
-        let is_whole_body = context.config.solver.is_whole_body();
         for round in 0.. {
-            if named && !is_whole_body {
+            if named && !context.config.solver.is_whole_body() {
                 self.match_all(context, poses, 0, true);
             } else {
                 self.match_sites(context, poses);
             }
-            let Self { limbwise, whole_body, correspondences, .. } = self;
-            let problem = problem(context, correspondences, context.previous, round);
-            let again =
-                if is_whole_body { whole_body.prepare(&problem, poses) } else { limbwise.prepare(&problem, poses) };
-            if !again {
+            let problem = problem(context, &self.correspondences, context.previous, round);
+            if !self.warm_start.prepare(&problem, poses) {
                 break;
             }
         }
@@ -261,7 +256,7 @@ impl Fit {
 
     /// Steps 6 and 7: fits the body to the correspondences.
     pub(crate) fn solve(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose], step: usize) {
-        let Self { limbwise, whole_body, correspondences, band_weights, .. } = self;
+        let Self { whole_body, correspondences, band_weights, .. } = self;
         if context.config.solver.is_whole_body() {
             whole_body.solve(&problem(context, correspondences, predicted, step), poses);
             return;
@@ -269,7 +264,7 @@ impl Fit {
         // 6 Elastic bands on both limbs.
         correspondences.add_bands(&context.model.body, poses, context.config.band_ratio, band_weights);
         // 7 Fit the model.
-        limbwise.solve(&problem(context, correspondences, predicted, step), poses);
+        solve_limbwise(&problem(context, correspondences, predicted, step), poses);
     }
 }
 

@@ -1,6 +1,6 @@
 //! The published solver: weighted absolute orientation of each limb separately (K06 IV-B.7, K07 3.2).
 
-use super::{Problem, WarmStart};
+use super::Problem;
 use crate::association::correspondence::LimbMatches;
 use crate::math::{Mat3, Moments, Pose, Vec3};
 
@@ -8,50 +8,29 @@ use crate::math::{Mat3, Moments, Pose, Vec3};
 const STAY: f64 = 0.05;
 
 /// Moves each limb to the optimum of its own pairs; information crosses one joint per step through the bands.
-#[derive(Debug, Default)]
-pub(crate) struct Limbwise {
-    warm_start: WarmStart,
-}
-
-/// Warm-start rounds in which the chain follows the sites; each of them reassigns the points.
-const LIMBWISE_ROUNDS: usize = 3;
-
-impl Limbwise {
-    /// One update of all poses (working frame).
-    pub(crate) fn solve(&mut self, problem: &Problem, poses: &mut [Pose]) {
-        let correspondences = problem.correspondences;
-        for (limb, pose) in poses.iter_mut().enumerate() {
-            // Moments about the limb's own position keep the sums well conditioned.
-            let center = pose.translation;
-            let mut moments = surface_moments(&correspondences.limbs[limb], center);
-            for pair in correspondences.sites.iter().filter(|pair| pair.limb == limb) {
-                moments.add(pair.weight, pair.x - center, pair.p - center);
+pub(crate) fn solve_limbwise(problem: &Problem, poses: &mut [Pose]) {
+    let correspondences = problem.correspondences;
+    for (limb, pose) in poses.iter_mut().enumerate() {
+        // Moments about the limb's own position keep the sums well conditioned.
+        let center = pose.translation;
+        let mut moments = surface_moments(&correspondences.limbs[limb], center);
+        for pair in correspondences.sites.iter().filter(|pair| pair.limb == limb) {
+            moments.add(pair.weight, pair.x - center, pair.p - center);
+        }
+        for band in &correspondences.bands {
+            // Each band appears twice, once for each limb that it joins: the end on the other limb is the target (K07 4.3).
+            if band.child == limb {
+                moments.add(band.child_weight, band.on_child - center, band.on_parent - center);
             }
-            for band in &correspondences.bands {
-                // Each band appears twice, once for each limb that it joins: the end on the other limb is the target (K07 4.3).
-                if band.child == limb {
-                    moments.add(band.child_weight, band.on_child - center, band.on_parent - center);
-                }
-                if band.parent == limb {
-                    moments.add(band.parent_weight, band.on_parent - center, band.on_child - center);
-                }
-            }
-            if let Some(motion) = moments.absolute_orientation(STAY) {
-                let rotation = (motion.rotation * pose.rotation).normalize();
-                // x - center = 0 at the limb's own position, so its image is the translation of the motion.
-                *pose = Pose::from_parts(center + motion.translation, rotation);
+            if band.parent == limb {
+                moments.add(band.parent_weight, band.on_parent - center, band.on_child - center);
             }
         }
-    }
-
-    /// Warm start: follows the named sites before the first step of a frame. Returns true to request another round.
-    /// `problem.predicted` are the poses before the frame.
-    pub(crate) fn prepare(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {
-        if !self.warm_start.drives_all(problem) {
-            return false;
+        if let Some(motion) = moments.absolute_orientation(STAY) {
+            let rotation = (motion.rotation * pose.rotation).normalize();
+            // x - center = 0 at the limb's own position, so its image is the translation of the motion.
+            *pose = Pose::from_parts(center + motion.translation, rotation);
         }
-        self.warm_start.step(problem, poses);
-        problem.step + 1 < LIMBWISE_ROUNDS
     }
 }
 

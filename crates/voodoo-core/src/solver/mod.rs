@@ -1,5 +1,5 @@
-//! Step 7: fits the pose to the correspondences. The solver is the one replaceable part of the step: [`Limbwise`], or
-//! [`WholeBody`] with or without elastic bands.
+//! Step 7: fits the pose to the correspondences. The solver is the one replaceable part of the step:
+//! [`solve_limbwise`], or [`WholeBody`] with or without elastic bands.
 
 mod chain;
 mod lengths;
@@ -11,7 +11,7 @@ mod warm_start;
 mod whole_body;
 
 pub(crate) use chain::ChainSolver;
-pub(crate) use limbwise::Limbwise;
+pub(crate) use limbwise::solve_limbwise;
 pub(crate) use schedule::Gate;
 pub(crate) use spread::Spread;
 pub(crate) use tree::TreeSolver;

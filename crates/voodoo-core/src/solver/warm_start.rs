@@ -12,6 +12,7 @@ use super::{ChainSolver, LIMIT_SIGMA, Problem};
 use crate::association::correspondence::SitePair;
 use crate::body::Body;
 use crate::body::kinematics::{joint_turn, place};
+use crate::config::SolverKind;
 use crate::math::{Pose, refill, reset};
 use crate::terms::normal_equations::{LimbBlock, NormalEquations};
 use crate::terms::{Limits, Prior, Sites, Surface, Term};
@@ -21,6 +22,13 @@ use crate::terms::{Limits, Prior, Sites, Surface, Term};
 const DRIVING_INFORMATION: f64 = 2.0;
 /// Scale of the kernel, meters: large, because the sites may be far from the limbs.
 const SCALE: f64 = 0.5;
+
+/// Sites farther than this from their measurement move the chain before points are assigned, meters: points assigned to the limb at
+/// its old pose would hold it there. And the number of such rounds.
+const DRIVEN_FROM: f64 = 0.25;
+const WARM_START_ROUNDS: usize = 4;
+/// Rounds in which the chain follows the sites for the limbwise solver; each of them reassigns the points.
+const LIMBWISE_ROUNDS: usize = 3;
 
 /// Damped Gauss-Newton steps on the sites, and on the points where they are matched before the warm start.
 #[derive(Debug, Default)]
@@ -41,8 +49,22 @@ pub(crate) struct WarmStart {
 }
 
 impl WarmStart {
+    /// Follows the named sites before the first step of a frame. Returns true to request another round. `problem.predicted` are the
+    /// poses before the frame.
+    pub(crate) fn prepare(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {
+        let (drives, rounds) = match problem.config.solver {
+            SolverKind::Limbwise => (self.drives_all(problem), LIMBWISE_ROUNDS),
+            SolverKind::Chain => (self.drives_far(problem), WARM_START_ROUNDS),
+            SolverKind::Tree => return false,
+        };
+        if drives {
+            self.step(problem, poses);
+        }
+        drives && problem.step + 1 < rounds
+    }
+
     /// Lets all limbs move, with points matched; returns false without sites.
-    pub(crate) fn drives_all(&mut self, problem: &Problem) -> bool {
+    fn drives_all(&mut self, problem: &Problem) -> bool {
         let count = problem.body.limbs().len();
         reset(&mut self.driven, count, true);
         reset(&mut self.following, count, false);
@@ -53,10 +75,10 @@ impl WarmStart {
         self.following.contains(&true)
     }
 
-    /// Whether sites farther than `from` meters from their measured positions move their limbs in this frame, without points.
-    pub(crate) fn drives_far(&mut self, problem: &Problem, from: f64) -> bool {
+    /// Whether sites far from their measured positions move their limbs in this frame, without points.
+    fn drives_far(&mut self, problem: &Problem) -> bool {
         if problem.step == 0 {
-            let far = |pair: &&SitePair| pair.weight > 0.0 && (pair.across * (pair.x - pair.p)).length() > from;
+            let far = |pair: &&SitePair| pair.weight > 0.0 && (pair.across * (pair.x - pair.p)).length() > DRIVEN_FROM;
             self.following.clear();
             reset(&mut self.driven, problem.body.limbs().len(), false);
             for pair in problem.correspondences.sites.iter().filter(far) {
@@ -67,7 +89,7 @@ impl WarmStart {
     }
 
     /// One step: each limb moves as it would with closed joints; gaps that the bands left are kept.
-    pub(crate) fn step(&mut self, problem: &Problem, poses: &mut [Pose]) {
+    fn step(&mut self, problem: &Problem, poses: &mut [Pose]) {
         let Problem { body, correspondences, config, .. } = problem;
         if problem.step == 0 {
             poses.clone_into(&mut self.start);

@@ -1,7 +1,7 @@
 //! Solves for all limbs at once: sums the terms into one system, which the chain or the tree solves.
 
 use super::schedule::narrowed;
-use super::{ChainSolver, LIMIT_SIGMA, Problem, TreeSolver, WarmStart};
+use super::{ChainSolver, LIMIT_SIGMA, Problem, TreeSolver};
 use crate::body::{JointKind, Pair};
 use crate::config::SolverKind;
 use crate::math::{Pose, Quat, Vec3, refill, reset};
@@ -33,10 +33,6 @@ const LEG_TO_REST: f64 = 0.03;
 pub(crate) const LENGTH_INFORMATION: [f64; 2] = [1e4, 5e2];
 /// Minimum scale of the kernel of sites, meters: sites were gated before, and a lost limb has a large residual.
 pub(crate) const SITE_SCALE: f64 = 0.15;
-/// Sites farther than this from their measurement move the chain before points are assigned, meters; and the number of such
-/// rounds.
-const DRIVEN_FROM: f64 = 0.25;
-const WARM_START_ROUNDS: usize = 4;
 
 /// Damped Gauss-Newton on robust terms.
 #[derive(Debug, Default)]
@@ -45,7 +41,6 @@ pub(crate) struct WholeBody {
     chain: ChainSolver,
     /// Solves for the limbs instead of the chain, with elastic bands at the joints.
     tree: TreeSolver,
-    warm_start: WarmStart,
     joint_sigmas: Vec<f64>,
     /// Where joints rest that nothing shows.
     rests: Vec<Rest>,
@@ -93,17 +88,6 @@ impl WholeBody {
     ) -> bool {
         self.sum_terms(problem, poses, false);
         self.chain.lengths(problem.body, &self.normal, poses, pairs, pull, change)
-    }
-
-    /// Warm start: follows the named sites before the first step of a frame. Returns true to request another round.
-    /// `problem.predicted` are the poses before the frame.
-    pub(crate) fn prepare(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {
-        // At such a distance, points assigned to the limb at its old pose would hold it there.
-        if problem.config.solver == SolverKind::Tree || !self.warm_start.drives_far(problem, DRIVEN_FROM) {
-            return false;
-        }
-        self.warm_start.step(problem, poses);
-        problem.step + 1 < WARM_START_ROUNDS
     }
 
     /// Sums the normal equations at `poses`, with or without the sites that have a bias.
