@@ -119,19 +119,9 @@ impl Hypotheses {
 
     /// Reserves memory for the body and all candidates of the frame, so that later steps do not allocate.
     fn make_room(&mut self, context: Context, fit: &Fit) {
-        let Self { rough, color_directions, pool: Pool { points, stretched, detected, .. }, refined, branch, .. } =
-            self;
+        let Self { rough, pool: Pool { points, stretched, detected, .. }, refined, branch, .. } = self;
         let Refined { poses, tried, .. } = refined;
-        for poses in [
-            &mut rough.trial,
-            &mut color_directions.trial,
-            points,
-            stretched,
-            detected,
-            poses,
-            tried,
-            &mut branch.tried,
-        ] {
+        for poses in [&mut rough.trial, points, stretched, detected, poses, tried, &mut branch.tried] {
             make_room(poses, context.model.body.limbs().len());
         }
         let most = context.observation.candidates.len();

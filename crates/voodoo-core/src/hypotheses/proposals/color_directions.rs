@@ -10,7 +10,6 @@ use crate::math::{Pose, Vec3, make_room, refill};
 /// Search over directions, with working memory.
 #[derive(Debug, Default)]
 pub(in crate::hypotheses) struct ColorDirections {
-    pub(in crate::hypotheses) trial: Vec<Pose>,
     /// The best directions of the upper limb, working frame, and their costs in ascending order.
     kept: Vec<(f64, Vec3)>,
 }
@@ -20,7 +19,7 @@ impl Propose for ColorDirections {
         if at.regions.is_none() {
             return;
         }
-        self.find_directions(at);
+        self.find_directions(at, &mut rough.trial);
         let body = &at.context.model.body;
         for &(_, upper) in &self.kept {
             let bend = at.root() + at.chain.lengths[0] * upper;
@@ -34,8 +33,8 @@ impl Propose for ColorDirections {
 
 impl ColorDirections {
     /// Finds the directions of the upper limb of lowest cost. The current direction is one of the candidates.
-    fn find_directions(&mut self, at: Extremity) {
-        let Self { trial, kept } = self;
+    fn find_directions(&mut self, at: Extremity, trial: &mut Vec<Pose>) {
+        let Self { kept } = self;
         let (chain, body, poses) = (at.chain, &at.context.model.body, at.matched.poses);
         make_room(kept, SWIVELS);
         for upper in directions().chain([poses[chain.upper].rotation * Vec3::Z]) {
