@@ -25,9 +25,10 @@ pub(super) const NOTHING: u16 = u16::MAX;
 pub(super) struct LimbLabels {
     /// A cell is two to this power pixels wide and high.
     bits: u32,
-    columns: usize,
+    pub(super) columns: usize,
     rows: usize,
-    limb: Vec<u16>,
+    /// The label of each cell, row by row.
+    pub(super) limb: Vec<u16>,
     /// Depth of each cell; infinite where there is no limb.
     depth: Vec<f32>,
     /// Ranges of columns and rows that may contain a limb.

@@ -40,7 +40,7 @@ impl ColorRegions {
         let Some(camera) = self.cameras.iter().find(|camera| camera.number == picture.number) else { return likely };
         let view = camera.view(picture, &camera.labels, &self.groups);
         let cell = 1_usize << super::CELL_BITS;
-        let cells = distances(&camera.labels, [width, height], cell as f32 / camera.unit);
+        let cells = distances(&camera.labels, cell as f32 / camera.unit);
         let nearest = |index: usize| cells[index / width / cell * width.div_ceil(cell) + index % width / cell];
         // Log ratios, and then their means along rows and columns.
         let mut ratios = vec![0.0_f32; likely.len()];
@@ -84,14 +84,11 @@ fn means(values: &[f32], width: usize, stride: usize) -> Vec<f32> {
 }
 
 /// Of every cell the signed distance outside of the contour of what is drawn, and the nearest limb; a cell is `side` units wide.
-fn distances(labels: &super::LimbLabels, size: [usize; 2], side: f32) -> Vec<(f32, u16)> {
-    let cell = 1_usize << super::CELL_BITS;
-    let [columns, rows] = size.map(|size| size.div_ceil(cell));
-    let visible = |index: usize| labels.at(index % columns * cell, index / columns * cell).0;
+fn distances(labels: &super::LimbLabels, side: f32) -> Vec<(f32, u16)> {
     let spread_from = |is_start: fn(u16) -> bool| {
-        let start = |limb: u16| (if is_start(limb) { 0.0 } else { f32::INFINITY }, limb);
-        let mut cells: Vec<(f32, u16)> = (0..columns * rows).map(visible).map(start).collect();
-        spread(&mut cells, columns);
+        let start = |limb: &u16| (if is_start(*limb) { 0.0 } else { f32::INFINITY }, *limb);
+        let mut cells: Vec<(f32, u16)> = labels.limb.iter().map(start).collect();
+        spread(&mut cells, labels.columns);
         cells
     };
     let (outward, inward) = (spread_from(|limb| limb != NOTHING), spread_from(|limb| limb == NOTHING));
