@@ -27,7 +27,6 @@ impl Term for DetectedJoints<'_> {
             let r = *x - *p;
             let far = r.length_squared() / (FAR_SIGMAS * FAR_SIGMAS * sigma * sigma);
             let information = information / ((1.0 + far) * (1.0 + far));
-            normal.cost += information * (1.0 + far) * r.length_squared();
             normal.limbs[*limb].add_point(&(Mat3::IDENTITY * information), *x, r);
         }
     }

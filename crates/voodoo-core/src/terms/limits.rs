@@ -49,7 +49,6 @@ pub(super) fn add_angles(
             let Some((weight, residual)) = row(v[axis], *limits) else { continue };
             // d v = J^-1 (relative rotation in the joint frame); one row of the inverse left Jacobian.
             normal.joints[limb].add_row(weight, world_from_joint * inverse_left_jacobian_row(v, axis), residual);
-            normal.cost += weight * residual * residual;
         }
     }
 }

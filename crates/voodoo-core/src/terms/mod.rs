@@ -45,7 +45,7 @@ const LARGEST_COST: f64 = 10.0;
 /// which is limited, because no model of an error holds far away, and lower than the sum of squares, because nearby measurements
 /// err alike.
 pub(crate) trait Term {
-    /// Adds cost, gradient and information at `poses` (working frame).
+    /// Adds gradient and information at `poses` (working frame).
     fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations);
 
     /// Negative log-likelihood of the pose of one limb, nats. Terms that do not tell such poses apart have none.

@@ -54,7 +54,6 @@ impl Penetration<'_> {
         each_overlap(body, poses, [limb, other], |place, normal_there, overlap| {
             // The distance grows when the point moves along the normal, and when the surface moves against it.
             let row = line(place, normal_there);
-            normal.cost += weight * overlap * overlap;
             // The mixed block of the two twists is left out: the system only has blocks of single limbs and joints.
             normal.limbs[limb].add_row(weight, &-row, overlap);
             normal.limbs[other].add_row(weight, &row, overlap);

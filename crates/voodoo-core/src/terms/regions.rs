@@ -43,7 +43,6 @@ impl Colors<'_> {
 impl Term for Regions<'_> {
     fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut NormalEquations) {
         for pair in self.pairs {
-            normal.cost += pair.information * pair.distance * pair.distance;
             let row = line(pair.x, pair.normal);
             normal.limbs[pair.limb].add_row(pair.information, &row, -pair.distance);
         }

@@ -26,8 +26,7 @@ impl Term for Sites<'_> {
     fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut NormalEquations) {
         for pair in self.correspondences.sites.iter().filter(|pair| self.biased || pair.bias <= 0.0) {
             let r = pair.x - pair.p;
-            let (rho, kernel) = geman_mcclure(r.length(), self.scale);
-            normal.cost += pair.weight * self.information * rho;
+            let kernel = geman_mcclure(r.length(), self.scale);
             normal.limbs[pair.limb].add_point(&(pair.information * (self.information * kernel)), pair.x, r);
         }
     }
