@@ -149,8 +149,8 @@ impl Uncertainty {
     fn sum_terms(&mut self, found: FittedPose, proven: impl Fn(usize) -> bool) {
         let FittedPose { body, poses, correspondences, config, .. } = found;
         self.normal.clear(poses.len());
-        let measurements = Measurements::new(correspondences, config, config.kernel_end, SITE_SCALE, true);
-        measurements.add(body, poses, &mut self.normal);
+        let scales = [config.kernel_end, SITE_SCALE];
+        Measurements { correspondences, config, scales, biased: true }.add(body, poses, &mut self.normal);
         for (limb, block) in self.normal.limbs.iter_mut().enumerate() {
             let most = PATCHES_PER_METER * body.limbs()[limb].shape.length();
             let lines = correspondences.regions.iter().filter(|pair| pair.limb == limb).count();
