@@ -11,7 +11,7 @@ mod skeleton;
 
 pub(crate) use bound::{BoundDetector, PlacedDetection};
 pub(crate) use joint_map::{Detected, JointMap};
-pub(crate) use measured::{DetectedLimbs, MeasuredJoint};
+pub(crate) use measured::DetectedLimbs;
 pub(crate) use placement::{fit_body, fit_pose, is_sized_like, place};
 
 use crate::body::Body;

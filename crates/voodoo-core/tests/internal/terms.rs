@@ -145,10 +145,10 @@ proptest! {
                 let x = poses[site.limb] * site.position;
                 let p = Vec3::new(targets[index], targets[index + 20], targets[index + 40]);
                 let d = Vec3::new(targets[index + 5], 0.3, 0.8).normalize();
-                let information = if index % 2 == 0 { Mat3::IDENTITY } else { Mat3::IDENTITY - Mat3::from_cols(d * d.x, d * d.y, d * d.z) };
+                let across = if index % 2 == 0 { Mat3::IDENTITY } else { Mat3::IDENTITY - Mat3::from_cols(d * d.x, d * d.y, d * d.z) };
                 // A ray's target is the closest point on it.
                 let p = if index % 2 == 0 { p } else { p + d * (x - p).dot(d) };
-                SitePair { limb: site.limb, local: site.position, x, p, weight: 1.0, base_weight: 1.0, bias: 0.0, across: Mat3::IDENTITY, information, source: 0 }
+                SitePair { limb: site.limb, local: site.position, x, p, weight: 1.0, base_weight: 1.0, bias: 0.0, across, source: 0 }
             }).collect()
         };
         let add = |poses: &[Pose], normal: &mut NormalEquations| {
@@ -182,18 +182,17 @@ proptest! {
     fn detected_joints(angles in angles(), offsets in proptest::collection::vec(-0.4..0.4_f64, 18)) {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let poses = random_pose(&body, &angles);
-        let targets: Vec<Vec3> = poses.iter().zip(&offsets).map(|(pose, off)| pose.translation + Vec3::new(*off, 0.1, -off)).collect();
-        let local = Vec3::new(0.02, 0.0, 0.1);
+        let targets: Vec<Vec3> = body.sites().iter().zip(&offsets).map(|(site, off)| poses[site.limb].translation + Vec3::new(*off, 0.1, -off)).collect();
         let add = |poses: &[Pose], system: &mut NormalEquations| {
-            let pairs: Vec<DetectedPair> = poses.iter().zip(&targets).enumerate().map(|(limb, (pose, p))| {
-                DetectedPair { limb, local, x: *pose * local, p: *p, sigma: 0.05, information: 1.0 + limb as f64 }
+            let pairs: Vec<DetectedPair> = targets.iter().enumerate().map(|(site, p)| {
+                DetectedPair { site, p: *p, sigma: 0.05, information: 1.0 + site as f64 }
             }).collect();
             DetectedJoints { pairs: &pairs }.add(&body, poses, system);
         };
         let cost = |poses: &[Pose]| {
-            let joints = poses.iter().zip(&targets).enumerate();
+            let sites = body.sites().iter().zip(&targets).enumerate();
             // The scale of the kernel is five standard deviations in space.
-            joints.map(|(limb, (pose, p))| (1.0 + limb as f64) * rho((*pose * local).distance(*p), 8.66 * 0.05)).sum()
+            sites.map(|(index, (site, p))| (1.0 + index as f64) * rho((poses[site.limb] * site.position).distance(*p), 8.66 * 0.05)).sum()
         };
         check(&body, &poses, &add, &cost)?;
     }
