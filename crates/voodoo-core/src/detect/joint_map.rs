@@ -21,15 +21,19 @@ pub(crate) struct JointMap {
     pub(super) lengths: usize,
     /// Joints and lengths of a person's skeleton.
     pub(super) skeleton: Skeleton,
-    root: Option<usize>,
-    trunk: Vec<usize>,
-    legs: Vec<usize>,
+    /// The joint that is the body's root, if the detector reports it.
+    pub(super) root: Option<usize>,
+    /// Joints that give the trunk's position and orientation; for a body without shoulders and hips, all joints that it has.
+    pub(crate) trunk: Vec<usize>,
+    /// Knees and ankles.
+    pub(super) legs: Vec<usize>,
     ankles: Vec<usize>,
     /// For every limb: the joint to its parent, the other joints on it, and its length.
     hangs_by: Vec<Option<usize>>,
     on_limb: Vec<Vec<usize>>,
     length_of_limb: Vec<Option<usize>>,
-    stature: Option<usize>,
+    /// The stature, if the detector reports it.
+    pub(crate) stature: Option<usize>,
 }
 
 impl JointMap {
@@ -77,29 +81,9 @@ impl JointMap {
         self.sites.get(joint).copied().flatten()
     }
 
-    /// Joints that give the trunk's position and orientation; for a body without shoulders and hips, all joints that it has.
-    pub(crate) fn trunk(&self) -> &[usize] {
-        &self.trunk
-    }
-
-    /// Knees and ankles.
-    pub(crate) fn legs(&self) -> &[usize] {
-        &self.legs
-    }
-
-    /// The length of every limb of the body, if the detector reports it. All parts of the trunk share one length.
-    pub(crate) fn length_of_limb(&self) -> &[Option<usize>] {
-        &self.length_of_limb
-    }
-
-    /// The stature, if the detector reports it.
-    pub(crate) fn stature(&self) -> Option<usize> {
-        self.stature
-    }
-
-    /// The joint that is the body's root, if the detector reports it.
-    pub(super) fn root(&self) -> Option<usize> {
-        self.root
+    /// The length of a limb of the body, if the detector reports it. All parts of the trunk share one length.
+    pub(crate) fn length_of_limb(&self, limb: usize) -> Option<usize> {
+        self.length_of_limb.get(limb).copied().flatten()
     }
 }
 

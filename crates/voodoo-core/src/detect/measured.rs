@@ -18,7 +18,7 @@ impl Detected<'_> {
     /// space, in variances, beyond the one that is expected; from 0 to 1.
     fn excess_deviation(&self, body: &Body, poses: &[Pose], origin: Vec3) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0_f64);
-        for joint in self.map.trunk().iter().chain(self.map.legs()) {
+        for joint in self.map.trunk.iter().chain(&self.map.legs) {
             if let (Some(joint), Some(site)) = (self.joint(*joint), self.map.site(*joint)) {
                 let apart = body.site_position(poses, site) + origin - joint.position;
                 sum += apart.length_squared() / (3.0 * joint.sigma * joint.sigma);

@@ -4,7 +4,7 @@ use super::clothes::Clothes;
 use super::person::Person;
 use super::tentative_tracks::{SAME_PERSON, TentativeTrack};
 use super::{ONE_BODY, People, Refusal, assign};
-use crate::body::{Body, Model};
+use crate::body::Body;
 use crate::config::SolverKind;
 use crate::detect::{Detected, DetectionQuery, PlacedDetection, Surroundings, fit_body};
 use crate::math::{Pose, Vec3};
@@ -119,7 +119,7 @@ impl People {
             for next in 0..MOST_TOGETHER {
                 let Some(one) = found.get(next) else { break };
                 let detected = Detected { detection: &one.detection, map: self.detector.map() };
-                newcomers.extend(fit_body(&Model::new(self.prototype.clone()), detected));
+                newcomers.extend(fit_body(&self.prototype, detected));
                 // Newcomers are numbered after all persons.
                 let (image, pixels) = (&frame.images[number], &one.detection.pixels);
                 self.assignment.assign_segment(image, number, pixels, self.persons.len(), &newcomers);
@@ -270,9 +270,8 @@ impl People {
 
     /// Returns the body of a tentative track, in its sizes, and its poses.
     fn fit_track(&self, track: &TentativeTrack) -> Option<(Body, Vec<Pose>)> {
-        let model = Model::new(self.prototype.clone());
         match track.positions.as_slice() {
-            [] => fit_body(&model, self.detected(track)),
+            [] => fit_body(&self.prototype, self.detected(track)),
             positions => self.detected_body().fit(&sites_of(positions), true).ok(),
         }
     }

@@ -62,7 +62,7 @@ pub(crate) enum DetectionVerdict {
 
 /// Whether the trunk was detected elsewhere than at these poses, whose frame has its origin at `origin` in the world.
 pub(crate) fn trunk_is_elsewhere(detected: Detected, body: &Body, poses: &[Pose], origin: Vec3) -> bool {
-    let [apart, spread] = joint_distance(detected, body, poses, origin, detected.map.trunk());
+    let [apart, spread] = joint_distance(detected, body, poses, origin, &detected.map.trunk);
     apart > ELSEWHERE && apart > SIGMAS * spread
 }
 

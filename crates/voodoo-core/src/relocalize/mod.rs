@@ -107,7 +107,7 @@ impl Relocalizer {
         let detected = self.detected()?;
         match set.filter(|set| is_sized_like(set, detected, SIGMAS)) {
             Some(set) => Some((set.clone(), fit_pose(set, detected)?)),
-            None => fit_body(model, detected),
+            None => fit_body(&model.reference_body, detected),
         }
     }
 

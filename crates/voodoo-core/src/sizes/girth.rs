@@ -156,6 +156,37 @@ pub(crate) struct Girth {
     total: GirthFit,
 }
 
+/// Takes over what the first frame measured of one of `girths`, see [`Girth::start`], into the body, and moves the limb's pose along.
+pub(super) fn start_girth(
+    girths: &mut [Girth],
+    limb: usize,
+    system: &GirthSystem,
+    share: f64,
+    body: &mut Body,
+    pose: &mut Pose,
+) {
+    let Some(prior) = GirthPrior::of(body, limb, girths) else { return };
+    let Some(step) = girths[limb].start(system, &prior, share) else { return };
+    if body.change_girth(limb, step.shift, step.axes()) {
+        pose.translation += pose.rotation * step.shift;
+    }
+}
+
+/// Adds what a later frame measured of one of `girths`, see [`Girth::follow`], to the body.
+pub(super) fn follow_girth(
+    girths: &mut [Girth],
+    limb: usize,
+    system: &GirthSystem,
+    (axis_sigma, frames): (f64, f64),
+    kept: Matrix3<f64>,
+    body: &mut Body,
+) {
+    let Some(prior) = GirthPrior::of(body, limb, girths) else { return };
+    if let Some(axes) = girths[limb].follow(system, axis_sigma, frames, kept, &prior) {
+        body.change_girth(limb, Vec3::ZERO, axes);
+    }
+}
+
 /// Normal equations of a limb of known pose in the first frame, from its matches and edges; `None` with too few points. Weights are
 /// robust (Cauchy).
 pub(super) fn first_system(

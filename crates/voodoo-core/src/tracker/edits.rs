@@ -75,7 +75,7 @@ impl BodyTracker {
             }
         }
         fit.clear();
-        sizes.edited(model, relocalizer.map());
+        sizes.edited(model);
         relocalizer.restart(model, &motion.poses);
         assessor.edited(estimate.status);
         self.report(self.motion.stamp.unwrap_or(f64::NAN), 0, None);

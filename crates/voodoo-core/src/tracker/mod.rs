@@ -19,7 +19,7 @@ use crate::observation::frame::Frame;
 use crate::observation::observer::{Observer, Own};
 use crate::observation::ownership::OwnershipMask;
 use crate::relocalize::{DetectionVerdict, FrameOutcome, Reasons, Relocalizer, trunk_is_elsewhere};
-use crate::sizes::{Reliance, Sizes, Start};
+use crate::sizes::{Sizes, Start};
 use crate::uncertainty::FittedPose;
 use assess::Assessor;
 use estimate::{Estimate, Status};
@@ -245,7 +245,7 @@ impl BodyTracker {
         let root = origin + motion.expect(&model.body, frame.stamp, config.prediction)[0].translation;
         let suspect = hypotheses.has_excess() || assessor.has_suspect_limb();
         let reasons = Reasons {
-            uncertain: suspect || assessor.is_uncertain(&model.extremities) || sizes.is_uncertain(),
+            uncertain: suspect || assessor.is_uncertain(&model.extremities) || sizes.is_uncertain(relocalizer.map()),
             anywhere: interrupted,
             // Beside other persons, what the body does not explain may be theirs.
             unlike: ownership.others == 0 && hypotheses.unlike(),
@@ -321,8 +321,10 @@ impl BodyTracker {
         }
         // Refinement of the sizes with this frame.
         let lost = assessor.status() == Status::Lost;
-        let reliance = Reliance { lost, girths: schedule.whole_body, limb: |limb| assessor.is_reliable(limb) };
-        sizes.refine(setting, model, poses, predicted, fit, reliance);
+        sizes.refine_lengths(setting, model, poses, predicted, fit, relocalizer.map(), lost);
+        if schedule.whole_body {
+            sizes.refine_girths(setting, model, poses, fit, |limb| assessor.is_reliable(limb));
+        }
         // Assessment: status of the body and its limbs.
         assessor.assess(setting.with_model(model), fit.matched(poses), relocalizer.detected());
         fit.learn_regions(setting.with_model(model));
