@@ -296,8 +296,8 @@ impl BodyTracker {
         if let Some((image, pixels)) = moved_to {
             observer.release(frame, ownership, Own { image: *image, pixels });
         }
-        observer.gather(frame, *origin, &body_box(&model.body, poses, config.body_box_margin), ownership, config);
-        let observation = observer.observation(frame, *origin, ownership);
+        let bounds = body_box(&model.body, poses, config.body_box_margin);
+        let observation = observer.gather(frame, *origin, &bounds, ownership, config);
         let setting = Setting { config, observation, previous, time_scale };
         // One with the trunk elsewhere is another person's, or the track is wrong.
         let here = |detected: &Detected| !trunk_is_elsewhere(*detected, &model.body, poses, *origin);
@@ -406,8 +406,7 @@ impl BodyTracker {
     fn reassess(&mut self, frame: &Frame, ownership: OwnershipMask) {
         let Self { config, model, motion: Motion { poses, previous, origin, .. }, observer, fit, assessor, .. } = self;
         let bounds = body_box(&model.body, poses, config.body_box_margin);
-        observer.gather(frame, *origin, &bounds, ownership, config);
-        let observation = observer.observation(frame, *origin, ownership);
+        let observation = observer.gather(frame, *origin, &bounds, ownership, config);
         let setting = Setting { config, observation, previous, time_scale: 1.0 };
         fit.match_all(setting.with_model(model), poses, config.max_steps);
         assessor.moved();
@@ -432,7 +431,7 @@ impl BodyTracker {
     /// Fills the estimate: for a frame `time_scale` after the last one, or, with `None`, for a pose that was set.
     fn report(&mut self, stamp: f64, steps: usize, time_scale: Option<f64>) {
         let Self { config, model, motion, observer, fit, hypotheses, sizes, assessor, estimate, .. } = self;
-        estimate.fill(&model.body, motion, fit.correspondences(), observer.candidates());
+        estimate.fill(&model.body, motion, fit.correspondences(), &observer.candidates);
         (estimate.stamp, estimate.steps) = (stamp, steps);
         let Some(time_scale) = time_scale else {
             assessor.report_status(model, estimate);
