@@ -106,7 +106,8 @@ impl Backgrounds {
         }
     }
 
-    /// Sets the learned depth to unknown at pixels that show a person. Depths learned behind the person stay.
+    /// Sets the learned depth to unknown at pixels that show a person. Depths learned behind the person stay: without them, the
+    /// background would look like a flat body once the person is gone.
     pub(crate) fn release(&mut self, frame: &Frame, own: Own) {
         let Some(image) = frame.images.get(own.image) else { return };
         let Some(depth) = self.depth_mut(image) else { return };

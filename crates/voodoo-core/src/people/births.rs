@@ -9,6 +9,7 @@ use crate::config::SolverKind;
 use crate::detect::{Detected, DetectionQuery, PlacedDetection, Surroundings, fit_body};
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::{DepthImage, Frame, PositionRelation};
+use crate::observation::observer::Own;
 use crate::observation::ownership::NO_OWNER;
 
 /// Shortest time between two detections in pixels that no person explains, seconds, while anybody is tracked.
@@ -36,7 +37,8 @@ impl People {
         self.detect_new(frame);
         let mut confirmed = self.tentative.take_confirmed(frame.stamp);
         confirmed.retain(|track| !self.is_part_of_tracked(frame, track));
-        self.refusal = self.tentative.greatest_at(frame.stamp).map(|log_odds| Refusal::Doubtful { log_odds });
+        let sums = self.tentative.updated_at(frame.stamp).map(|track| track.log_odds);
+        self.refusal = sums.max_by(f64::total_cmp).map(|log_odds| Refusal::Doubtful { log_odds });
         if !confirmed.is_empty() {
             self.associate(frame, &confirmed);
         }
@@ -56,7 +58,7 @@ impl People {
         let around = Surroundings {
             ground: frame.ground,
             excluded: frame.excluded,
-            owners: &self.assignment.owners()[track.image],
+            owners: &self.assignment.owners[track.image],
             own: Some(number as u16),
             ..Surroundings::default()
         };
@@ -138,11 +140,11 @@ impl People {
     /// Returns the persons who are detected in an image, and are to be tracked.
     fn detect_in_image(&mut self, frame: &Frame, number: usize, query: DetectionQuery) -> Vec<PlacedDetection> {
         let image = &frame.images[number];
-        let scene = self.scene.known().depth(image);
+        let scene = self.scene.known.depth(image);
         let around = Surroundings {
             ground: frame.ground,
             excluded: frame.excluded,
-            owners: self.assignment.owners().get(number).map_or(&[], Vec::as_slice),
+            owners: self.assignment.owners.get(number).map_or(&[], Vec::as_slice),
             // A person may have stood there since the camera started, so only an old background is excluded.
             background: if self.scene.is_old(number, frame.stamp) { scene } else { &[] },
             ..Surroundings::default()
@@ -160,7 +162,7 @@ impl People {
 
     /// Returns the middle of those pixels of a segment that nobody owns, world frame, if these are many.
     fn rest_of_segment(&self, image: &DepthImage, number: usize, pixels: &[usize]) -> Option<Vec3> {
-        let owners = &self.assignment.owners()[number];
+        let owners = &self.assignment.owners[number];
         let free = || pixels.iter().filter(|pixel| owners[**pixel] == NO_OWNER);
         let place = |pixel: usize| image.back_project(pixel, image.pixels.get(pixel) * image.meters_per_unit as f32);
         let (count, sum) = (free().count() as f64, free().map(|pixel| place(*pixel)).sum::<Vec3>());
@@ -288,7 +290,7 @@ impl People {
         if let Some((body, poses)) = self.fit_track(track) {
             let tracked = |owner: u16| usize::from(owner) < self.persons.len();
             let free = |image: usize, pixel: usize| {
-                self.assignment.owners()[image].get(pixel).is_some_and(|owner| !tracked(*owner))
+                self.assignment.owners[image].get(pixel).is_some_and(|owner| !tracked(*owner))
             };
             clothes.observe(frame, &body, &poses, free);
         }
@@ -314,13 +316,13 @@ impl People {
 
     /// Starts a person's tracker at a tentative track, in the pixels whose owner is `own`. Returns whether the person is there.
     fn reactivate(&mut self, frame: &Frame, track: &TentativeTrack, number: usize, own: usize) -> bool {
-        self.scene.release(frame, track.image, &track.detection.pixels);
+        self.scene.known.release(frame, Own { image: track.image, pixels: &track.detection.pixels });
         let person = &mut self.persons[number];
         if !self.options.includes(person.id) {
             return false;
         }
         let known = person.created < frame.stamp;
-        let ownership = self.assignment.ownership(own, self.scene.known());
+        let ownership = self.assignment.ownership(own, &self.scene.known);
         let detected = Detected { detection: &track.detection, map: self.detector.map() };
         let placed = PlacedDetection { index: 0, root: track.place, detection: track.detection.clone() };
         let depth_frame = &Frame { colors: &[], ..*frame };

@@ -105,9 +105,9 @@ impl Tracker {
         let id = self.followed().id;
         // What was measured on the one who is followed says nothing about others.
         let free = frame.clouds.iter().all(|cloud| cloud.scope == Scope::Free);
-        let clouds = if free { frame.clouds } else { &[] };
+        let (clouds, own) = if free { (frame.clouds, &[][..]) } else { (&[][..], frame.clouds) };
         let shared = Frame { clouds, colors: &[], positions: &[], rays: &[], ..*frame };
-        self.people.advance(&shared, &[(id, *frame)]);
+        self.people.advance(&shared, &[(id, Frame { clouds: own, ..*frame })]);
         let person = self.followed();
         if !person.present {
             person.tracker.stop(frame.stamp);

@@ -31,7 +31,8 @@ pub(super) struct PredictedBody<'a> {
 pub(super) struct PixelAssignment {
     /// Numbers of the bodies that pixels and points were assigned to.
     assigned: Vec<u16>,
-    owners: Vec<Vec<u16>>,
+    /// The owner of each pixel, image after image.
+    pub(super) owners: Vec<Vec<u16>>,
     cloud_owners: Vec<Vec<u16>>,
     distances: Vec<f32>,
     /// Depths of a row, meters.
@@ -44,11 +45,6 @@ pub(super) struct PixelAssignment {
 }
 
 impl PixelAssignment {
-    /// Returns the owner of each pixel, image after image.
-    pub(super) fn owners(&self) -> &[Vec<u16>] {
-        &self.owners
-    }
-
     /// Returns the ownership mask of a person for this frame.
     pub(super) fn ownership<'a>(&'a self, number: usize, scene: &'a Backgrounds) -> OwnershipMask<'a> {
         let own = number as u16;

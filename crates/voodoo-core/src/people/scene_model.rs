@@ -2,7 +2,6 @@
 
 use crate::observation::background::{Background, Backgrounds};
 use crate::observation::frame::Frame;
-use crate::observation::observer::Own;
 use crate::observation::ownership::NO_OWNER;
 
 /// One row in this many is learned per frame, for speed; the scene is static.
@@ -27,7 +26,8 @@ const SAME: f32 = 0.05;
 /// The learned depth of the scene, and pending depths that may become part of it.
 #[derive(Debug, Default)]
 pub(super) struct SceneModel {
-    known: Backgrounds,
+    /// The learned scene.
+    pub(super) known: Backgrounds,
     images: Vec<PendingDepth>,
     row: usize,
     /// Number of pixels in the rows that were learned last, and of those that show neither a person nor the known scene.
@@ -52,11 +52,6 @@ impl SceneModel {
     /// Returns a scene of which nothing is known yet; with `learns` false, nothing ever is.
     pub(super) fn new(learns: bool) -> Self {
         Self { off: !learns, ..Self::default() }
-    }
-
-    /// Returns the learned scene.
-    pub(super) fn known(&self) -> &Backgrounds {
-        &self.known
     }
 
     /// Registers the images of a frame. For a new camera, or one that moved far, the scene is unknown.
@@ -134,12 +129,6 @@ impl SceneModel {
         };
         2 * pixels.iter().filter(still).count() > pixels.len()
     }
-
-    /// Releases pixels of an image that show a person: where they agree with the learned depth, that depth is deleted. Learned
-    /// depth behind the person is kept; without it, the background would look like a flat body once the person is gone.
-    pub(super) fn release(&mut self, frame: &Frame, image: usize, pixels: &[usize]) {
-        self.known.release(frame, Own { image, pixels });
-    }
 }
 
 /// Whether a return is clearly before the known scene, or where nothing was seen before.
@@ -165,6 +154,7 @@ fn learn_pixel(known: &mut f32, tentative: &mut f32, frames: &mut u8, z: f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::observation::observer::Own;
     use crate::testing::with_frame;
 
     const PIXELS: usize = 160 * 124;
@@ -214,8 +204,8 @@ mod tests {
             let mut scene = SceneModel::default();
             (0..3).for_each(|frame| feed(&mut scene, 5000, frame, |_, _| ()));
             feed(&mut scene, came, 3, |scene, frame| {
-                scene.release(frame, 0, &[7]);
-                assert_eq!(scene.known().depth(&frame.images[0])[7..9], [left, 5.0]);
+                scene.known.release(frame, Own { image: 0, pixels: &[7] });
+                assert_eq!(scene.known.depth(&frame.images[0])[7..9], [left, 5.0]);
             });
         }
     }
