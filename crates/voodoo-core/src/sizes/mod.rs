@@ -9,7 +9,7 @@ use crate::body::{Body, Model, Pair};
 use crate::config::Config;
 use crate::detect::{Detected, JointMap};
 use crate::fit::{CONTOUR_FROM, Fit, Setting};
-use crate::math::{Pose, Vec3, reset};
+use crate::math::{Pose, Vec3};
 use crate::solver::{Gate, LENGTH_INFORMATION};
 use color_girth::ColorGirths;
 use girth::{
@@ -61,15 +61,15 @@ pub(crate) struct Sizes {
 impl Sizes {
     /// Restarts after a pose was set. Unless the sizes are known, the next frame fits them and later frames refine the lengths.
     pub(crate) fn restart(&mut self, model: &Model, start: Start, config: &Config) {
-        let fit = start != Start::SizesKnown;
-        (self.open, self.rough) = (fit, start == Start::Detected);
-        self.set = fit.then(|| model.body.clone());
-        let estimated = if fit && config.fit_girths { model.body.limbs().len() } else { 0 };
-        reset(&mut self.girths, estimated, Girth::default());
-        self.color_girths = ColorGirths::default();
-        self.pairs.clear();
-        self.reported = ReportedLengths::default();
-        if fit && config.fit_lengths {
+        *self = Self::default();
+        if start == Start::SizesKnown {
+            return;
+        }
+        (self.open, self.rough, self.set) = (true, start == Start::Detected, Some(model.body.clone()));
+        if config.fit_girths {
+            self.girths = vec![Girth::default(); model.body.limbs().len()];
+        }
+        if config.fit_lengths {
             self.follow_lengths(model);
         }
     }
@@ -223,9 +223,7 @@ impl Sizes {
             let factor = ((*total + change.clamp(-LENGTH_STEP, LENGTH_STEP)) / *total)
                 .clamp(shortest / *total, longest / *total);
             *total *= factor;
-            pair.iter().for_each(|limb| {
-                model.body.change_length(*limb, factor);
-            });
+            pair.iter().for_each(|limb| model.body.change_length(*limb, factor));
         }
         model.body.close_joints(poses);
     }
