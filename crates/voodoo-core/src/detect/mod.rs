@@ -15,7 +15,7 @@ pub(crate) use measured::DetectedLimbs;
 pub(crate) use placement::{fit_body, fit_pose, is_sized_like, place};
 
 use crate::body::Body;
-use crate::math::{Aabb, Pose, Vec3};
+use crate::math::{Aabb, Vec3};
 use crate::observation::background::Background;
 use crate::observation::frame::{DepthImage, Ground};
 use crate::observation::ownership::NO_OWNER;
@@ -244,14 +244,8 @@ impl Surroundings<'_> {
         depth.extend((0..image.pixels.len()).map(|index| {
             let z = image.pixels.get(index) * image.meters_per_unit as f32;
             let open = z > 0.0 && z.is_finite() && !self.explains(index, z);
-            let excluded = || self.excludes(world_point(image, index, z));
+            let excluded = || self.excludes(image.world_from_sensor * image.back_project(index, z));
             if open && (self.excluded.is_empty() || !excluded()) { z } else { 0.0 }
         }));
     }
-}
-
-/// World position of a pixel at a depth of `z` meters.
-fn world_point(image: &DepthImage, index: usize, z: f32) -> Vec3 {
-    let world_from_sensor: &Pose = &image.world_from_sensor;
-    *world_from_sensor * image.back_project(index, z)
 }

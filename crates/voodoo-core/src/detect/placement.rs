@@ -22,7 +22,7 @@ pub(crate) fn fit_pose(body: &Body, detected: Detected) -> Option<Vec<Pose>> {
 
 /// Position of a detected person's root, world frame: the detected root joint, else the root of the fitted body.
 pub(crate) fn place(body: &Body, detected: Detected) -> Option<Vec3> {
-    match detected.map.root.and_then(|root| detected.joint(root)) {
+    match detected.map.skeleton.root.and_then(|root| detected.joint(root)) {
         Some(root) => Some(root.position),
         None => fit_pose(body, detected).and_then(|poses| poses.first().map(|root| root.translation)),
     }
