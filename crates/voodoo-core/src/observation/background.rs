@@ -17,7 +17,7 @@ pub(crate) const OTHERS: f32 = f32::MIN_POSITIVE;
 /// Depth of the scene behind the body, one value per pixel; 0 where it is unknown.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Background {
-    pub(super) world_from_sensor: Option<Pose>,
+    pub(super) world_from_sensor: Pose,
     pub(super) width: usize,
     pub(super) depth: Vec<f32>,
     /// The ray `(x/z, y/z)` on which each depth was observed; empty while the camera has not moved: then it is the ray through
@@ -53,8 +53,7 @@ impl Background {
 
     /// Whether this background belongs to the image: to the same camera at the same pose.
     pub(super) fn fits(&self, image: &DepthImage) -> bool {
-        self.is_sized_like(image)
-            && self.world_from_sensor.is_some_and(|known| is_static(&known, &image.world_from_sensor))
+        self.is_sized_like(image) && is_static(&self.world_from_sensor, &image.world_from_sensor)
     }
 
     pub(super) fn is_sized_like(&self, image: &DepthImage) -> bool {
@@ -97,7 +96,7 @@ impl Backgrounds {
         }
         self.images.resize_with(frame.images.len(), Background::default);
         for (number, (image, own)) in frame.images.iter().zip(&mut self.images).enumerate() {
-            (own.world_from_sensor, own.width) = (Some(image.world_from_sensor), image.camera.width());
+            (own.world_from_sensor, own.width) = (image.world_from_sensor, image.camera.width());
             refill(&mut own.depth, ownership.scene.depth(image).iter().copied());
             own.depth.resize(image.pixels.len(), 0.0);
             for (depth, owner) in own.depth.iter_mut().zip(ownership.owners(number)) {
