@@ -79,7 +79,7 @@ impl People {
         });
         let tracked = self.persons.iter().any(Person::is_tracked);
         let wait = match tracked {
-            true if self.searches_everywhere(frame) || self.scene.shows_something_new() => DETECT_EVERY,
+            true if self.searches_everywhere(frame) || !self.scene.shows_nobody_new => DETECT_EVERY,
             true => f64::INFINITY,
             false => 0.0,
         };
@@ -94,7 +94,7 @@ impl People {
         // Of several persons who touch, those who are found first show where the others are.
         let query = match tracked {
             true if !first => DetectionQuery::New,
-            false if self.everybody => DetectionQuery::Any,
+            false if self.followed().is_none() => DetectionQuery::Any,
             _ => DetectionQuery::All,
         };
         self.detect(frame, query);
@@ -103,7 +103,8 @@ impl People {
     /// Whether somebody may be in what does not move: before every view was searched, and while somebody is lost.
     fn searches_everywhere(&self, frame: &Frame) -> bool {
         let searched = (0..frame.images.len()).all(|number| self.scene.is_old(number, frame.stamp));
-        self.everybody && (!searched || self.persons.iter().any(|person| person.present && !person.is_tracked()))
+        self.followed().is_none()
+            && (!searched || self.persons.iter().any(|person| person.present && !person.is_tracked()))
     }
 
     /// Whether a detection may be of somebody new or lost, and not of a person whose given start nothing confirmed yet.
@@ -278,10 +279,15 @@ impl People {
         }
     }
 
+    /// The one who is followed, `None` where everybody is wanted. Others than that one are looked for only when something moves: a
+    /// look at every piece of furniture takes as long as three frames.
+    fn followed(&self) -> Option<&Person> {
+        self.persons.first().filter(|person| person.followed)
+    }
+
     /// The body whose sites the frame's detections name: that of the one who is followed may have been edited.
     fn detected_body(&self) -> &Body {
-        let followed = self.persons.first().filter(|person| person.followed);
-        followed.map_or(&self.prototype, |person| person.tracker.body())
+        self.followed().map_or(&self.prototype, |person| person.tracker.body())
     }
 
     /// Returns the colors of a tentative track's clothes.

@@ -68,8 +68,6 @@ pub struct People {
     detector: BoundDetector,
     last_detection: Option<f64>,
     refusal: Option<Refusal>,
-    /// Whether everybody is wanted; otherwise only the one who is followed, and others are looked for when something moves.
-    everybody: bool,
     stamp: Option<f64>,
     threads: Threads,
 }
@@ -84,12 +82,11 @@ impl People {
             persons: Vec::new(),
             next_id: 1,
             assignment: PixelAssignment::default(),
-            scene: SceneModel::new(config.background),
+            scene: SceneModel::default(),
             tentative: TentativeTracks::default(),
             detector: BoundDetector::default(),
             last_detection: None,
             refusal: None,
-            everybody: true,
             stamp: None,
             threads,
             config: Config { threads: 1, ..config },
@@ -159,7 +156,7 @@ impl People {
     /// Forgets everybody but the first person, and the scene. The next frame may have any stamp.
     fn forget_others(&mut self) {
         self.persons.truncate(1);
-        (self.scene, self.tentative) = (SceneModel::new(self.config.background), TentativeTracks::default());
+        (self.scene, self.tentative) = Default::default();
         (self.last_detection, self.stamp) = (None, None);
     }
 
@@ -183,7 +180,9 @@ impl People {
         self.stamp = Some(frame.stamp);
         self.refusal = None;
         self.detector.clear_error();
-        self.scene.register(frame);
+        if self.config.background {
+            self.scene.register(frame);
+        }
         self.assign_pixels(frame);
         let shown = self.match_detections(frame);
         self.follow(frame, own, &shown);

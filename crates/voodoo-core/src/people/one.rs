@@ -52,8 +52,6 @@ impl Tracker {
         (person.followed, person.last_tracked) = (true, f64::NEG_INFINITY);
         people.persons.push(person);
         people.next_id += 1;
-        // Others matter when they move, and a look at every piece of furniture takes as long as three frames.
-        people.everybody = false;
         Ok(Self { people })
     }
 
