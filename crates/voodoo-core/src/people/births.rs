@@ -131,7 +131,7 @@ impl People {
                 }
             }
             for found in found {
-                let still = self.scene.is_still(frame, number, &found.detection.pixels);
+                let still = self.scene.is_still(&frame.images[number], &found.detection.pixels);
                 let odds = still.then(|| self.detector.static_odds());
                 self.tentative.update(TentativeTrack::in_image(frame.stamp, found, number), odds);
             }

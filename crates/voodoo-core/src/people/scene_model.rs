@@ -1,7 +1,7 @@
 //! Model of the static scene shared by all persons, learned in pixels that no person owns.
 
 use crate::observation::background::{Background, Backgrounds};
-use crate::observation::frame::Frame;
+use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::ownership::NO_OWNER;
 
 /// One row in this many is learned per frame, for speed; the scene is static.
@@ -106,8 +106,7 @@ impl SceneModel {
     }
 
     /// Whether most of these pixels of an image show the learned scene.
-    pub(super) fn is_still(&self, frame: &Frame, image: usize, pixels: &[usize]) -> bool {
-        let Some(image) = frame.images.get(image) else { return false };
+    pub(super) fn is_still(&self, image: &DepthImage, pixels: &[usize]) -> bool {
         let known = self.known.depth(image);
         let still = |pixel: &&usize| {
             let known = known.get(**pixel).copied().unwrap_or(0.0);
