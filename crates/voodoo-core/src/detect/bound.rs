@@ -77,8 +77,7 @@ impl BoundDetector {
     ) -> Vec<PlacedDetection> {
         let Some(detector) = self.detector.as_mut() else { return Vec::new() };
         let checked = detector.detect(image, around, query).and_then(|found| {
-            let each = found.iter().enumerate();
-            each.into_iter().try_for_each(|(index, detection)| check(index, detection, &self.map, image))?;
+            found.iter().enumerate().try_for_each(|(index, detection)| check(index, detection, &self.map, image))?;
             Ok(found)
         });
         let found = match checked {

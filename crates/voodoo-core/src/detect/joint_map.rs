@@ -123,9 +123,4 @@ impl<'a> Detected<'a> {
     pub(crate) fn ankles(&self) -> impl Iterator<Item = &'a DetectedJoint> + '_ {
         self.map.skeleton.legs.iter().filter_map(|leg| self.joint(leg[2]?))
     }
-
-    /// The length with this index, and its relative standard deviation.
-    pub(crate) fn length(&self, index: usize) -> Option<[f64; 2]> {
-        self.detection.lengths.get(index).copied()
-    }
 }
