@@ -3,7 +3,7 @@
 use crate::math::{Pose, refill};
 use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::observer::Own;
-use crate::observation::ownership::OwnershipMask;
+use crate::observation::ownership::{NO_OWNER, OwnershipMask};
 
 /// A pixel belongs to the background unless it lies more than this in front of it: meters, plus a fraction of the depth, because
 /// the noise of depth cameras grows with depth.
@@ -86,7 +86,7 @@ impl Backgrounds {
     /// Becomes the scene as one person sees it: with what other persons explain hidden. A frame without images keeps what is known
     /// of the cameras.
     pub(super) fn mask(&mut self, frame: &Frame, ownership: OwnershipMask) {
-        let is_others = |owner: &u16| ownership.is_others(*owner);
+        let is_others = |owner: &u16| *owner != NO_OWNER && *owner != ownership.own;
         self.others.resize_with(ownership.cloud_owners.len(), Vec::new);
         for (others, owners) in self.others.iter_mut().zip(ownership.cloud_owners) {
             refill(others, owners.iter().map(is_others));
