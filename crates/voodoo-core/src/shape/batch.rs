@@ -1,7 +1,7 @@
 //! Closest points of batches of queries.
 
+use super::TaperedEllipticCylinder;
 use super::kernel::{BLOCK, Block, BlockResult, Constants, FEW, MORE, SHORT, closest};
-use super::{Region, TaperedEllipticCylinder};
 use crate::math::{Points, Pose, Vec3, load, store, widest_fused};
 use std::ops::Range;
 
@@ -22,7 +22,7 @@ const SETTLED: f64 = 0.2;
 /// let mut found = SurfaceBatch::default(); // kept and reused: no allocation per call
 /// forearm.closest_points(&Pose::IDENTITY, &queries, &mut found);
 /// assert!((found.signed_distance[0] - 0.1).abs() < 1e-6);
-/// assert_eq!(found.region[1], Region::ProximalCap);
+/// assert_eq!(Region::from_u8(found.region[1]), Some(Region::ProximalCap));
 /// # Ok::<(), voodoo_core::ShapeError>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -33,11 +33,21 @@ pub struct SurfaceBatch {
     pub normals: Points,
     /// Distances, meters, negative inside.
     pub signed_distance: Vec<f32>,
-    /// Faces.
-    pub region: Vec<Region>,
+    /// Faces: [`Region`](super::Region) as a number, decoded by [`Region::from_u8`](super::Region::from_u8).
+    pub region: Vec<u8>,
 }
 
 impl SurfaceBatch {
+    /// Number of results.
+    pub fn len(&self) -> usize {
+        self.region.len()
+    }
+
+    /// True when there is no result.
+    pub fn is_empty(&self) -> bool {
+        self.region.is_empty()
+    }
+
     /// Reserves memory for `len` results in total.
     pub fn reserve(&mut self, len: usize) {
         self.points.reserve(len);
@@ -50,7 +60,7 @@ impl SurfaceBatch {
         self.points.resize(len);
         self.normals.resize(len);
         self.signed_distance.resize(len, 0.0);
-        self.region.resize(len, Region::Side);
+        self.region.resize(len, 0);
     }
 
     /// Computes the result of one query in double precision.
@@ -62,7 +72,7 @@ impl SurfaceBatch {
         self.points.set(index, point.as_vec3().to_array());
         self.normals.set(index, normal.as_vec3().to_array());
         self.signed_distance[index] = found.signed_distance as f32;
-        self.region[index] = found.region;
+        self.region[index] = found.region as u8;
     }
 }
 

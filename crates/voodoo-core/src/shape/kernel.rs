@@ -38,7 +38,7 @@ pub(super) struct BlockResult<const N: usize> {
     pub points: Block<N>,
     pub normals: Block<N>,
     pub signed_distance: [f32; N],
-    pub region: [Region; N],
+    pub region: [u8; N],
     /// Not zero where the exact path must compute the result.
     pub unsettled: [u8; N],
 }
@@ -48,7 +48,7 @@ impl<const N: usize> BlockResult<N> {
         points: Block::ZERO,
         normals: Block::ZERO,
         signed_distance: [0.0; N],
-        region: [Region::Side; N],
+        region: [0; N],
         unsettled: [0; N],
     };
 }
@@ -360,9 +360,9 @@ pub(super) fn closest<const FMA: bool, const N: usize, const STEPS: usize>(
         out.normals.y[i] = k.in_world::<FMA>(1, nx, ny, nz, 0.0);
         out.normals.z[i] = k.in_world::<FMA>(2, nx, ny, nz, 0.0);
         out.signed_distance[i] = sign * distance;
-        let edge = if side.t <= 0.0 { Region::ProximalRim } else { Region::DistalRim };
-        let lateral = if rim { edge } else { Region::Side };
-        let flat = if face.distal { Region::DistalCap } else { Region::ProximalCap };
+        let edge = if side.t <= 0.0 { Region::ProximalRim as u8 } else { Region::DistalRim as u8 };
+        let lateral = if rim { edge } else { Region::Side as u8 };
+        let flat = if face.distal { Region::DistalCap as u8 } else { Region::ProximalCap as u8 };
         out.region[i] = if cap { flat } else { lateral };
         // Written so that a NaN anywhere counts as unsettled.
         let clear = (side.trusted | face.decided)
