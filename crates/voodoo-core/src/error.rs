@@ -100,8 +100,14 @@ pub struct CameraError {
 }
 
 impl CameraError {
-    pub(crate) fn new(what: &'static str, expected: &'static str, found: impl Into<String>) -> Self {
-        Self { what, expected, found: found.into() }
+    /// Rejects a number that is not valid; the text is made only then.
+    pub(crate) fn unless(
+        valid: bool,
+        what: &'static str,
+        expected: &'static str,
+        found: impl Display,
+    ) -> Result<(), Self> {
+        if valid { Ok(()) } else { Err(Self { what, expected, found: found.to_string() }) }
     }
 }
 

@@ -121,13 +121,8 @@ pub(crate) fn with_setting<R>(
         let scene = if config.background { wall(frame) } else { Backgrounds::default() };
         let bounds = body_box(&model.body, poses, config.body_box_margin);
         observer.begin(frame, everything(&scene));
-        observer.gather(frame, Vec3::ZERO, &bounds, everything(&scene), config);
-        check(Setting {
-            config,
-            observation: observer.observation(frame, Vec3::ZERO, everything(&scene)),
-            previous: poses,
-            time_scale: 1.0,
-        })
+        let observation = observer.gather(frame, Vec3::ZERO, &bounds, everything(&scene), config);
+        check(Setting { config, observation, previous: poses, time_scale: 1.0 })
     })
 }
 

@@ -22,7 +22,7 @@ fn queries(shape: &TaperedEllipticCylinder, pose: &Pose, count: usize, random: &
 fn check(shape: &TaperedEllipticCylinder, pose: &Pose, queries: &Points) -> (f64, f64) {
     let mut out = SurfaceBatch::default();
     shape.closest_points(pose, queries, &mut out);
-    assert_eq!(out.len(), queries.len());
+    assert_eq!(out.region.len(), queries.len());
     let mut worst = (0f64, 0f64);
     for i in 0..queries.len() {
         let q = pose.inverse_transform_point(queries.get(i));
@@ -39,7 +39,7 @@ fn check(shape: &TaperedEllipticCylinder, pose: &Pose, queries: &Points) -> (f64
         // The point is on the surface, at that distance, and the same where it is unique.
         let limb = pose.inverse_transform_point(point);
         assert!((limb.distance(q) - distance.abs()).abs() < TOLERANCE, "{}", context());
-        assert!(shape.signed_distance(limb).abs() < TOLERANCE, "{}", context());
+        assert!(shape.closest_point(limb).signed_distance.abs() < TOLERANCE, "{}", context());
         let apart = limb.distance(exact.point);
         worst.0 = worst.0.max(error);
         let skew = shape.closest_point(q + Vec3::new(3e-5, 2e-5, -2.5e-5)).point;
@@ -135,7 +135,7 @@ fn a_result_does_not_depend_on_its_place_or_company() {
             let mut chosen = Points::default();
             (start..end).for_each(|index| chosen.push([all.x[index], all.y[index], all.z[index]]));
             shape.closest_points(&pose, &chosen, &mut part);
-            assert_eq!(part.len(), end - start);
+            assert_eq!(part.region.len(), end - start);
             for i in start..end {
                 let (here, there) = (i - start, i);
                 assert_eq!(part.points.get(here), together.points.get(there));

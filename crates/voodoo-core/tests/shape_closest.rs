@@ -174,7 +174,7 @@ fn approximate_distance_is_near_the_exact_one() {
     for shape in limb_like() {
         for _ in 0..1000 {
             let q = shape_support::surface_point(&shape, &mut random) + random.direction() * random.within(0.0, 0.05);
-            errors.push((shape.approximate_distance(q) - shape.signed_distance(q)).abs());
+            errors.push((shape.approximate_distance(q) - shape.closest_point(q).signed_distance).abs());
         }
     }
     errors.sort_by(f64::total_cmp);

@@ -10,7 +10,7 @@ use pyo3::type_object::PyTypeInfo;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3, matrix};
 use voodoo_core::{Body, ColorPixels, DepthPixels, Limb, PointSlice};
 
-use crate::errors::{MeasurementError, wrong_argument};
+use crate::errors::{unless, wrong_argument};
 
 /// A borrow of points `(N, 3)`, contiguous and aligned.
 #[derive(FromPyObject)]
@@ -105,11 +105,7 @@ pub(crate) type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
 /// Rejects NumPy's masked arrays: masked entries are ordinary numbers and would count as measured.
 pub(crate) fn unmasked(name: &str, value: &Bound<'_, PyAny>, instead: &str) -> PyResult<()> {
-    if value.hasattr("mask")? {
-        let text = format!("{name}: expected an array without a mask, found a masked one; {instead}");
-        return Err(MeasurementError::new_err(text));
-    }
-    Ok(())
+    unless(!value.hasattr("mask")?, name, "an array without a mask", format_args!("a masked one; {instead}"))
 }
 
 /// The array itself or a copy, C-contiguous and aligned.
@@ -124,11 +120,9 @@ pub(crate) fn contiguous<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, 
 
 /// Rows of three numbers.
 pub(crate) fn rows<'a, const N: usize>(name: &str, array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [[f64; N]]> {
-    if array.dims()[1] == N {
-        return Ok(array.as_slice()?.as_chunks().0);
-    }
-    let text = format!("{name}: expected shape (N, {N}), found {:?}", array.shape());
-    Err(MeasurementError::new_err(text))
+    let (expected, found) = (format_args!("shape (N, {N})"), format_args!("{:?}", array.shape()));
+    unless(array.dims()[1] == N, name, expected, found)?;
+    Ok(array.as_slice()?.as_chunks().0)
 }
 
 /// Rows of vectors.

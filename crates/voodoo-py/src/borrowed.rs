@@ -77,8 +77,8 @@ pub(crate) struct Borrowed<'py, 'a> {
     clouds: Vec<(PointView<'py>, Cloud<'static>)>,
     images: DepthViews<'py, 'a>,
     colors: ColorViews<'py, 'a>,
-    positions: Vec<PositionRelation>,
-    rays: Vec<RayRelation>,
+    pub(crate) positions: Vec<PositionRelation>,
+    pub(crate) rays: Vec<RayRelation>,
     detections: Vec<(Vec<PositionRelation>, f64)>,
 }
 
@@ -106,7 +106,7 @@ impl<'py, 'a> Borrowed<'py, 'a> {
         Ok(Self { held: frame, clouds, images, colors, positions, rays, detections })
     }
 
-    fn clouds(&self) -> PyResult<Vec<Cloud<'_>>> {
+    pub(crate) fn clouds(&self) -> PyResult<Vec<Cloud<'_>>> {
         self.clouds.iter().map(|(view, cloud)| Ok(Cloud { points: view.points()?, ..*cloud })).collect()
     }
 
@@ -127,29 +127,5 @@ impl<'py, 'a> Borrowed<'py, 'a> {
             .with_ground(self.held.ground)
             .with_excluded(&self.held.excluded);
         then(&frame)
-    }
-}
-
-/// The measurements of a person, together with the common ones.
-pub(crate) struct Parts<'a> {
-    clouds: Vec<Cloud<'a>>,
-    positions: Vec<PositionRelation>,
-    rays: Vec<RayRelation>,
-}
-
-impl<'a> Parts<'a> {
-    pub(crate) fn new(all: &Frame<'a>, own: &'a Borrowed) -> PyResult<Self> {
-        Ok(Self {
-            clouds: all.clouds.iter().copied().chain(own.clouds()?).collect(),
-            positions: [all.positions, &own.positions].concat(),
-            rays: [all.rays, &own.rays].concat(),
-        })
-    }
-
-    pub(crate) fn frame<'b>(&'b self, all: &Frame<'b>, stamp: f64) -> Frame<'b> {
-        let own = all.with_clouds(&self.clouds).with_positions(&self.positions).with_rays(&self.rays);
-        let mut frame = own.with_colors(&[]);
-        frame.stamp = stamp;
-        frame
     }
 }

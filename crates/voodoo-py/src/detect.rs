@@ -18,7 +18,7 @@ use voodoo_detect::{Detector, JOINTS, LENGTHS};
 use crate::arrays::{Row, contiguous, vector};
 use crate::borrowed::depth_images;
 use crate::camera::camera_of;
-use crate::errors::{ConfigError, MeasurementError, raise, wrong_argument};
+use crate::errors::{ConfigError, MeasurementError, raise, unless, wrong_argument};
 use crate::frame::PyFrame;
 
 #[doc = stub!("Detector")]
@@ -186,9 +186,7 @@ pub(crate) fn person_candidates<'py>(
     if view.as_array().dim() != (height, width) {
         return Err(wrong_argument("depth", &format!("shape ({height}, {width}), as its camera has"), depth));
     }
-    if !(enlarged > 0.0 && enlarged.is_finite()) {
-        return Err(MeasurementError::new_err(format!("enlarged: expected a finite factor above 0, found {enlarged}")));
-    }
+    unless(enlarged > 0.0 && enlarged.is_finite(), "enlarged", "a finite factor above 0", enlarged)?;
     let image = DepthImage {
         pixels: DepthPixels::F32(view.as_slice()?),
         camera: &camera,

@@ -130,15 +130,11 @@ impl PythonDetector {
             return Ok(Vec::new());
         }
         let sigmas: HashMap<String, f64> = mapping(person, "length_sigma")?;
-        let length = |name: &String| match (lengths.get(name), sigmas.get(name)) {
-            (Some(length), Some(sigma)) => Ok([*length, sigma / length]),
-            _ => {
-                let text = format!(
-                    "lengths and length_sigma: expected all of {}, found none of {name}",
-                    self.lengths.join(", ")
-                );
-                Err(MeasurementError::new_err(text))
-            }
+        let length = |name: &String| {
+            let (found, all) = (lengths.get(name).zip(sigmas.get(name)), self.lengths.join(", "));
+            let missing = || format!("lengths and length_sigma: expected all of {all}, found none of {name}");
+            let (length, sigma) = found.ok_or_else(|| MeasurementError::new_err(missing()))?;
+            Ok([*length, sigma / length])
         };
         self.lengths.iter().map(length).collect()
     }

@@ -1,5 +1,7 @@
 //! Core errors become the exceptions of `voodoo.errors`.
 
+use std::fmt::Display;
+
 use numpy::{PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::import_exception;
 use pyo3::prelude::*;
@@ -26,6 +28,11 @@ pub(crate) fn wrong(name: &str, expected: &str, found: &Bound<'_, PyAny>) -> Str
     };
     let more = if found.chars().count() > 120 { "..." } else { "" };
     format!("{name}: expected {expected}, found {found:.120}{more}")
+}
+
+/// Rejects a measurement that is not valid; the text is made only then.
+pub(crate) fn unless(valid: bool, name: impl Display, expected: impl Display, found: impl Display) -> PyResult<()> {
+    if valid { Ok(()) } else { Err(MeasurementError::new_err(format!("{name}: expected {expected}, found {found}"))) }
 }
 
 pub(crate) fn wrong_argument(name: &str, expected: &str, found: &Bound<'_, PyAny>) -> PyErr {

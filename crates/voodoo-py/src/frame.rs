@@ -12,7 +12,7 @@ use crate::arguments;
 use crate::arrays::{DepthView, Row, picture, points, pose, unmasked, vector, viewable};
 use crate::borrowed::{CloudData, ColorData, ColorViews, DepthViews, ImageData, PositionData, RayData, number};
 use crate::camera::camera_of;
-use crate::errors::{MeasurementError, wrong_argument};
+use crate::errors::{unless, wrong_argument};
 use crate::sites::PySiteRay;
 
 #[doc = stub!("Frame")]
@@ -97,13 +97,8 @@ impl PyFrame {
         let array = image.cast::<PyUntypedArray>().map_err(|_| wrong(&image.get_type()))?;
         unmasked("image", image, "fill it with 0, which is no return: image.filled(0)")?;
         let pixels = viewable::<DepthView>(image).ok_or_else(|| wrong(image))?.unbind();
-        if array.shape() != [height, width] {
-            let text = format!(
-                "image: expected {height} rows of {width} pixels, as its camera has, found shape {:?}",
-                array.shape()
-            );
-            return Err(MeasurementError::new_err(text));
-        }
+        let expected = format_args!("{height} rows of {width} pixels, as its camera has");
+        unless(array.shape() == [height, width], "image", expected, format_args!("shape {:?}", array.shape()))?;
         let data = ImageData {
             pixels,
             camera,
@@ -224,10 +219,8 @@ impl PyFrame {
             let (site, source, bias) = (ray.site.clone(), self.source(&ray.source), ray.bias);
             let (origin, direction) = (ray.origin.0, ray.direction.0);
             let weight = |sigma: f64| {
-                if sigma > 0.0 && sigma.is_finite() {
-                    return Ok((reference_sigma / sigma).powi(2).min(max_weight) * ray.trust);
-                }
-                Err(MeasurementError::new_err(format!("sigma: expected finite meters > 0, found {sigma}")))
+                unless(sigma > 0.0 && sigma.is_finite(), "sigma", "finite meters > 0", sigma)?;
+                Ok::<_, PyErr>((reference_sigma / sigma).powi(2).min(max_weight) * ray.trust)
             };
             if let Some(Row(position)) = ray.place {
                 let of = PositionRelation { site: 0, position, weight: weight(ray.place_sigma)?, bias, source };

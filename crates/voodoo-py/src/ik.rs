@@ -12,7 +12,7 @@ use voodoo_ik::{
 
 use crate::arrays::{Array, frozen, limb_poses, matrices, pose};
 use crate::body::PyBody;
-use crate::errors::{BodyError, MeasurementError, raise};
+use crate::errors::{BodyError, raise, unless};
 use crate::ik_view::PyView;
 
 /// Angles `(N, n)`; sites `(N, S, 3)`; h, steps, postures tried, those compared with images, and converged as 0 or 1, `(5, N)`; and of
@@ -85,12 +85,9 @@ impl PyChain {
     }
 
     fn checked(&self, angles: &[f64]) -> PyResult<()> {
-        if angles.len() == self.model.freedoms() && angles.iter().all(|angle| angle.is_finite()) {
-            return Ok(());
-        }
-        let (expected, found) = (self.model.freedoms(), format!("{angles:?}"));
-        let message = format!("angles: expected {expected} finite numbers, found {found:.120}");
-        Err(MeasurementError::new_err(message))
+        let valid = angles.len() == self.model.freedoms() && angles.iter().all(|angle| angle.is_finite());
+        let expected = format_args!("{} finite numbers", self.model.freedoms());
+        unless(valid, "angles", expected, format_args!("{:.120}", format!("{angles:?}")))
     }
 
     fn place(&self, base: &Bound<'_, PyAny>, angles: &[f64]) -> PyResult<Kinematics> {

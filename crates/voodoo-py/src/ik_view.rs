@@ -9,7 +9,7 @@ use voodoo_ik::SilhouetteView;
 
 use crate::arrays::pose;
 use crate::camera::camera_of;
-use crate::errors::MeasurementError;
+use crate::errors::unless;
 
 #[doc = stub!("View")]
 #[pyclass(name = "View", module = "voodoo._core", frozen)]
@@ -27,14 +27,11 @@ impl PyView {
         camera_from_world: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
         let [height, width] = [distance.shape()[0], distance.shape()[1]];
-        if width < 2 || height < 2 {
-            let message = format!("silhouette: expected at least 2 x 2 pixels, found {width} x {height}");
-            return Err(MeasurementError::new_err(message));
-        }
-        if [camera.height(), camera.width()] != [height, width] || camera.distorts() {
-            let message = format!("camera: expected a pinhole camera of {width} x {height} pixels, found {camera:?}");
-            return Err(MeasurementError::new_err(message));
-        }
+        let size = format_args!("{width} x {height}");
+        unless(width >= 2 && height >= 2, "silhouette", "at least 2 x 2 pixels", size)?;
+        let valid = [camera.height(), camera.width()] == [height, width] && !camera.distorts();
+        let expected = format_args!("a pinhole camera of {size} pixels");
+        unless(valid, "camera", expected, format_args!("{camera:?}"))?;
         Ok(Self(SilhouetteView {
             pixels: distance.as_slice()?.iter().zip(thickness.as_slice()?).map(|(d, t)| [*d, *t]).collect(),
             depth: depth.map_or(Ok(Vec::new()), |depth| depth.as_slice().map(<[f32]>::to_vec))?,

@@ -8,7 +8,7 @@ use voodoo_core::math::{Aabb, Vec3};
 use voodoo_core::{BodyTracker, Frame, People, PeopleOptions};
 
 use crate::body::PyBody;
-use crate::borrowed::{Borrowed, Parts};
+use crate::borrowed::Borrowed;
 use crate::config::config;
 use crate::detector::{detector, warn_of_detector};
 use crate::errors::{BodyError, raise};
@@ -90,13 +90,14 @@ impl PyPeople {
         let first = frame.sources.len();
         let owned = own.iter().map(|(_, frame)| Borrowed::new(py, frame, body, first)).collect::<PyResult<Vec<_>>>()?;
         let cameras: Vec<u16> = (0..).take(frame.colors.len()).collect();
+        let clouds = owned.iter().map(Borrowed::clouds).collect::<PyResult<Vec<_>>>()?;
+        let measured = own.iter().zip(&owned).zip(&clouds).map(|(((id, frame), own), clouds)| {
+            let frame = Frame::empty(frame.stamp).with_clouds(clouds);
+            (*id, frame.with_positions(&own.positions).with_rays(&own.rays))
+        });
+        let measured: Vec<(usize, Frame)> = measured.collect();
         let people = &mut self.people;
-        all.with_frame(&cameras, |input| {
-            let parts = owned.iter().map(|own| Parts::new(input, own)).collect::<PyResult<Vec<_>>>()?;
-            let frames: Vec<(usize, Frame)> =
-                own.iter().zip(&parts).map(|((id, own), parts)| (*id, parts.frame(input, own.stamp))).collect();
-            py.detach(|| people.step(input, &frames)).map_err(raise)
-        })?;
+        all.with_frame(&cameras, |input| py.detach(|| people.step(input, &measured)).map_err(raise))?;
         warn_of_detector(py, self.people.detector_error(), &mut self.detector_failures)?;
         let found = self.people.present().map(|(id, tracker)| {
             let (estimate, names) = (tracker.estimate().clone(), self.names.clone());

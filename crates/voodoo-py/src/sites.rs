@@ -6,7 +6,7 @@ use voodoo_core::math::Vec3;
 use voodoo_sensors::sites::SiteGate;
 
 use crate::arrays::{Row, vector};
-use crate::errors::{MeasurementError, raise};
+use crate::errors::{raise, unless};
 use crate::people::TrackedBody;
 
 /// Predicted positions of some sites, from a mapping of names to positions; `None` for missing ones.
@@ -43,11 +43,9 @@ impl PySiteGate {
     #[new]
     #[pyo3(signature = (radius=0.15, growth=0.5, widest=0.40))]
     fn new(radius: f64, growth: f64, widest: f64) -> PyResult<Self> {
-        if !(radius > 0.0 && growth >= 0.0 && widest >= radius) {
-            let found = format!("found radius {radius:?}, growth {growth:?}, widest {widest:?}");
-            let text = format!("gate: expected 0 < radius <= widest and growth >= 0, {found}");
-            return Err(MeasurementError::new_err(text));
-        }
+        let valid = radius > 0.0 && growth >= 0.0 && widest >= radius;
+        let found = format_args!("radius {radius:?}, growth {growth:?}, widest {widest:?}");
+        unless(valid, "gate", "0 < radius <= widest and growth >= 0", found)?;
         Ok(Self(SiteGate::new(radius, growth, widest)))
     }
 

@@ -8,7 +8,7 @@ use voodoo_core::{Body, Limb};
 
 use crate::arrays::{Array, array};
 use crate::body::{PyBody, at_rest};
-use crate::errors::MeasurementError;
+use crate::errors::{MeasurementError, unless};
 
 pub(crate) type Given<'py> = PyReadonlyArrayDyn<'py, f64>;
 /// A table of numbers, which is read faster than tuples.
@@ -20,20 +20,18 @@ pub(crate) fn frames<'a, const N: usize>(
     array: &'a PyReadonlyArrayDyn<'_, f64>,
 ) -> PyResult<Vec<&'a [[f64; N]]>> {
     let shape = array.shape();
-    if shape.len() < 2 || shape[2..].iter().product::<usize>() != N || !array.is_c_contiguous() {
-        let text = format!("contiguous frames of rows of {N} numbers, found shape {shape:?}");
-        return Err(wrong(name, &text));
-    }
+    let valid = shape.len() >= 2 && shape[2..].iter().product::<usize>() == N && array.is_c_contiguous();
+    let expected = format_args!("contiguous frames of rows of {N} numbers");
+    unless(valid, name, expected, format_args!("shape {shape:?}"))?;
     let rows = array.as_slice()?.as_chunks::<N>().0;
     Ok((0..shape[0]).map(|frame| rows.get(frame * shape[1]..(frame + 1) * shape[1]).unwrap_or_default()).collect())
 }
 
 /// Rows of a plan.
 pub(crate) fn plan<'a, const N: usize>(plan: &'a Plan<'_>) -> PyResult<&'a [[i64; N]]> {
-    match plan.shape()[1] {
-        columns if columns == N && plan.is_c_contiguous() => Ok(plan.as_slice()?.as_chunks().0),
-        columns => Err(wrong("plan", &format!("{N} columns, found {columns}"))),
-    }
+    let columns = plan.shape()[1];
+    unless(columns == N && plan.is_c_contiguous(), "plan", format_args!("{N} columns"), columns)?;
+    Ok(plan.as_slice()?.as_chunks().0)
 }
 
 /// The entry with a number of a plan.
@@ -272,9 +270,7 @@ fn are_axes(order: [usize; 3]) -> bool {
 #[pyfunction]
 pub(crate) fn euler_angles<'py>(py: Python<'py>, quaternions: Given<'py>, order: [usize; 3]) -> PyResult<Array<'py>> {
     let shape = [leading(&quaternions, &[4])?, &[3]].concat();
-    if !are_axes(order) {
-        return Err(MeasurementError::new_err(format!("order: expected axes that differ, found {order:?}")));
-    }
+    unless(are_axes(order), "order", "axes that differ", format_args!("{order:?}"))?;
     let rows = quaternions.as_slice()?.as_chunks::<4>().0;
     let found = rows.iter().flat_map(|row| math::euler_angles(row, order)).collect();
     array(py, found, &shape)

@@ -12,7 +12,7 @@ use voodoo_sensors::skin::depth::DepthBeside;
 
 use crate::arrays::{DepthView, Row, contiguous, vectors};
 use crate::camera::{affine, camera_of};
-use crate::errors::{MeasurementError, raise, wrong_argument};
+use crate::errors::{raise, unless, wrong_argument};
 use crate::people::TrackedBody;
 use crate::sites::places_of;
 
@@ -22,10 +22,8 @@ type Ray = (usize, Row, Option<Row>, f64);
 type DepthArguments<'py> = (Bound<'py, PyAny>, f64, Bound<'py, PyAny>, PyReadonlyArray2<'py, f64>);
 
 fn colors_of<'a>(image: &'a PyReadonlyArray3<'_, u8>) -> PyResult<&'a [[u8; 3]]> {
-    if image.dims()[2] != 3 {
-        let text = format!("image: expected shape (height, width, 3), found {:?}", image.shape());
-        return Err(MeasurementError::new_err(text));
-    }
+    let found = format_args!("{:?}", image.shape());
+    unless(image.dims()[2] == 3, "image", "shape (height, width, 3)", found)?;
     Ok(image.as_slice()?.as_chunks().0)
 }
 

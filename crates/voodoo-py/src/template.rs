@@ -6,7 +6,7 @@ use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyTupleMethods};
 
-use crate::errors::MeasurementError;
+use crate::errors::{MeasurementError, unless};
 use crate::estimate::PyEstimate;
 
 #[doc = stub!("Template")]
@@ -72,9 +72,7 @@ impl Template {
             (number >= 0.0 && number < count as f64 && number.fract() == 0.0).then_some((at, number as usize))
         };
         let places: Vec<_> = (0..messages.len()).filter_map(place).collect();
-        if places.is_empty() && count > 0 {
-            return Err(MeasurementError::new_err("numbers: expected some in the messages, found none"));
-        }
+        unless(!places.is_empty() || count == 0, "numbers", "some in the messages", "none")?;
         let stamps = found(&messages, stamp).collect();
         Ok(Self { messages, ends, places, count, stamps, single })
     }
@@ -87,10 +85,7 @@ impl Template {
         stamp: &[u8],
     ) -> PyResult<Vec<Bound<'py, PyBytes>>> {
         let all = all(&numbers);
-        if all.len() != self.count {
-            let text = format!("numbers: expected {}, found {}", self.count, all.len());
-            return Err(MeasurementError::new_err(text));
-        }
+        unless(all.len() == self.count, "numbers", self.count, all.len())?;
         let mut messages = self.messages.clone();
         for &(at, number) in &self.places {
             let number = all.get(number).copied().unwrap_or(f64::NAN);

@@ -13,7 +13,7 @@ use crate::body::{JointParts, PyBody, joint};
 use crate::borrowed::{Borrowed, ColorData, color_images, number};
 use crate::config::config;
 use crate::detector::{detector, warn_of_detector};
-use crate::errors::{MeasurementError, raise, wrong_argument};
+use crate::errors::{raise, unless, wrong_argument};
 use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
 use crate::people::TrackedBody;
@@ -57,10 +57,8 @@ impl PyTracker {
     fn cameras_of(&mut self, frame: &PyFrame) -> PyResult<Vec<u16>> {
         let camera = |data: &ColorData| {
             let name = &frame.sources[usize::from(data.source)];
-            if data.camera.distorts() {
-                let text = format!("color[{name}].camera: expected no distortion: undistort the picture, found some");
-                return Err(MeasurementError::new_err(text));
-            }
+            let (what, expected) = (format_args!("color[{name}].camera"), "no distortion: undistort the picture");
+            unless(!data.camera.distorts(), what, expected, "some")?;
             Ok(number(&mut self.cameras, name))
         };
         frame.colors.iter().map(camera).collect()

@@ -2,7 +2,7 @@
 
 use crate::association::correspondence::ContourPair;
 use crate::body::{Body, Limb};
-use crate::math::{Points, Pose, Vec3, refill, reset, smooth_step, vectorized};
+use crate::math::{Points, Pose, Vec3, refill, smooth_step, vectorized};
 use crate::observation::depth_view::{DepthView, Pixel};
 
 /// Where along a limb its contour is searched for, as fractions of its length; the ends also belong to the neighbors.
@@ -167,8 +167,6 @@ pub(crate) struct Contours {
     edges: Vec<LimbEdge>,
     places: Points,
     distance: Vec<f32>,
-    own: Vec<f32>,
-    others: Vec<f32>,
 }
 
 /// The edge of a limb, and its position in the working frame.
@@ -177,7 +175,8 @@ struct LimbEdge {
     limb: usize,
     edge: DepthEdge,
     target: Vec3,
-    /// Distance from the edge to the nearest other limb, meters.
+    /// Distances from the edge to the limb and to the nearest other one, meters.
+    own: f32,
     others: f32,
 }
 
@@ -196,38 +195,24 @@ impl Contours {
                 edges(&view, part, pose, |edge| {
                     self.places.push(edge.place.to_array().map(|value| value as f32));
                     let target = *pose * (edge.foot + edge.side * (edge.reach - edge.rim));
-                    self.edges.push(LimbEdge { limb, edge, target, others: f32::INFINITY });
+                    self.edges.push(LimbEdge { limb, edge, target, own: f32::INFINITY, others: f32::INFINITY });
                 });
             }
         }
-        self.find_distances(body, poses);
-        let mut distances = self.own.iter().zip(&self.others);
-        self.edges.retain_mut(|LimbEdge { edge, others, .. }| {
-            let Some((own, other)) = distances.next() else { return false };
-            *others = *other;
-            // Outside the rim, the edge may belong to another limb.
-            let [beyond, nearer] = OWNER_FADE;
-            let inside = 1.0 - smooth_step((edge.reach - edge.rim) / beyond);
-            edge.weight *= inside.max(smooth_step(f64::from(other - own) / nearer));
-            edge.weight > 0.0
-        });
-    }
-
-    /// Finds the distances of each edge position to the edge's own limb and to the nearest other one.
-    fn find_distances(&mut self, body: &Body, poses: &[Pose]) {
-        let count = self.places.len();
-        for distances in [&mut self.own, &mut self.others] {
-            reset(distances, count, f32::INFINITY);
-        }
         for (index, (limb, pose)) in body.limbs().iter().zip(poses).enumerate() {
             limb.shape.approximate_distances(pose, &self.places, &mut self.distance);
-            for ((found, [own, others]), distance) in
-                self.edges.iter().zip(self.own.iter_mut().zip(&mut self.others).map(<[_; 2]>::from)).zip(&self.distance)
-            {
-                let least = if found.limb == index { own } else { others };
+            for (found, distance) in self.edges.iter_mut().zip(&self.distance) {
+                let least = if found.limb == index { &mut found.own } else { &mut found.others };
                 *least = least.min(*distance);
             }
         }
+        self.edges.retain_mut(|LimbEdge { edge, own, others, .. }| {
+            // Outside the rim, the edge may belong to another limb.
+            let [beyond, nearer] = OWNER_FADE;
+            let inside = 1.0 - smooth_step((edge.reach - edge.rim) / beyond);
+            edge.weight *= inside.max(smooth_step(f64::from(*others - *own) / nearer));
+            edge.weight > 0.0
+        });
     }
 
     /// The edges on the sides of a limb that are clear of other limbs.

@@ -45,8 +45,6 @@ pub(crate) struct SitePair {
     pub bias: f64,
     /// Projection of the difference: the identity for a position, `I - d d^T` for a ray along `d`.
     pub across: Mat3,
-    /// Information: the weight times the identity for a position, times `I - d d^T` for a ray along `d`.
-    pub information: Mat3,
     /// Index of the source.
     pub source: u16,
 }
@@ -54,12 +52,8 @@ pub(crate) struct SitePair {
 /// A joint of the body and where it was detected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct DetectedPair {
-    /// The limb that carries the joint.
-    pub limb: usize,
-    /// The joint in the limb's frame.
-    pub local: Vec3,
-    /// The joint.
-    pub x: Vec3,
+    /// Index of the body's site.
+    pub site: usize,
     /// Where it was detected.
     pub p: Vec3,
     /// Standard deviation along each axis, meters.

@@ -24,7 +24,7 @@ impl Correspondences {
             let x = poses[limb] * local;
             let p = target(x);
             let weight = base_weight * beyond(bias, (x - p).length());
-            SitePair { limb, local, x, p, weight, base_weight, bias, across, information: across * weight, source }
+            SitePair { limb, local, x, p, weight, base_weight, bias, across, source }
         };
         for PositionRelation { site, position, weight, bias, source } in frame.positions {
             let target = |_| *position - origin;

@@ -69,8 +69,8 @@ impl Body {
     }
 
     /// Lengthens a limb by a factor, with everything fixed to it. Does nothing if the result would not be a valid solid.
-    pub(crate) fn change_length(&mut self, limb: usize, factor: f64) -> bool {
-        self.reshape(limb, factor, [1.0; 4], |position| position * Vec3::new(1.0, 1.0, factor))
+    pub(crate) fn change_length(&mut self, limb: usize, factor: f64) {
+        self.reshape(limb, factor, [1.0; 4], |position| position * Vec3::new(1.0, 1.0, factor));
     }
 
     /// Multiplies the length and the semi-axes (a0, b0, a1, b1) of a limb by factors, and replaces the positions of everything fixed

@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::Vector6;
 
 use crate::body::{Body, Joint, JointKind, Limb};
-use crate::math::{Pose, Quat, Vec3};
+use crate::math::{Pose, Quat, Vec3, refill};
 
 /// Layout of the unknowns of all limbs' joints in the vector of unknowns; the root has six.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -23,15 +23,12 @@ pub(crate) struct Chain {
 impl Chain {
     /// Lays out the unknowns of `body`.
     pub(crate) fn layout(&mut self, body: &Body) {
+        refill(&mut self.count, body.limbs().iter().map(freedoms));
+        refill(&mut self.parent, (0..body.limbs().len()).map(|limb| body.parent(limb).unwrap_or(0)));
         self.start.clear();
-        self.count.clear();
-        self.parent.clear();
         self.freedoms = 0;
-        for (index, limb) in body.limbs().iter().enumerate() {
-            let count = freedoms(limb);
+        for count in &self.count {
             self.start.push(self.freedoms);
-            self.count.push(count);
-            self.parent.push(body.parent(index).unwrap_or(0));
             self.freedoms += count;
         }
     }

@@ -174,23 +174,18 @@ impl Roles {
         };
         for (index, limb) in limbs.iter().enumerate() {
             let (Some((hangs_on, joint)), Some(role)) = (&limb.parent, self.joints[index]) else { continue };
-            let wrong =
-                |expected, found| Err(BodyError::value(format!("limbs.{}.joint.name", limb.name), expected, found));
-            if opposite(index, &joint.name) {
-                return wrong("a joint of the limb's own side", joint.name.clone());
-            }
+            let key = format_args!("limbs.{}.joint.name", limb.name);
+            BodyError::unless(!opposite(index, &joint.name), key, "a joint of the limb's own side", &joint.name)?;
             // A second joint of the same name belongs to another limb that is attached there.
             let Some((before, expected)) = role.after().filter(|_| self.limb_at(role) == Some(index)) else { continue };
             let Some(before) = self.limb_at(before) else { continue };
-            if !std::iter::successors(Some(*hangs_on), |limb| parent(*limb)).any(|limb| limb == before) {
-                return wrong(expected, format!("{} on {}", joint.name, limbs[*hangs_on].name));
-            }
+            let follows = std::iter::successors(Some(*hangs_on), |limb| parent(*limb)).any(|limb| limb == before);
+            BodyError::unless(follows, key, expected, format_args!("{} on {}", joint.name, limbs[*hangs_on].name))?;
         }
         for site in sites {
-            if JointRole::from_name(&site.name).is_some() && opposite(site.limb, &site.name) {
-                let (key, found) = (format!("sites.{}.limb", site.name), &limbs[site.limb].name);
-                return Err(BodyError::value(key, "a limb of the site's own side", found));
-            }
+            let (key, found) = (format_args!("sites.{}.limb", site.name), &limbs[site.limb].name);
+            let valid = JointRole::from_name(&site.name).is_none() || !opposite(site.limb, &site.name);
+            BodyError::unless(valid, key, "a limb of the site's own side", found)?;
         }
         Ok(())
     }

@@ -56,13 +56,11 @@ impl Lens {
             "equidistant" => (&[0, 4], "0 or 4 coefficients"),
             _ => {
                 let expected = "plumb_bob, rational_polynomial, equidistant or inverse_plumb_bob";
-                return Err(CameraError::new("model", expected, format!("{model:?}")));
+                return Err(CameraError { what: "model", expected, found: format!("{model:?}") });
             }
         };
-        if !counts.0.contains(&coefficients.len()) {
-            let found = format!("{} for {model}: {coefficients:?}", coefficients.len());
-            return Err(CameraError::new("distortion", counts.1, found));
-        }
+        let found = format_args!("{} for {model}: {coefficients:?}", coefficients.len());
+        CameraError::unless(counts.0.contains(&coefficients.len()), "distortion", counts.1, found)?;
         let straight = coefficients.iter().all(|value| *value == 0.0);
         Ok(match model {
             "equidistant" => Self::Fisheye(padded(coefficients)),

@@ -72,19 +72,16 @@ impl Camera {
     /// # Errors
     /// [`CameraError`] unless there are 1 to 33,554,432 pixels, the focal lengths are above zero, and all numbers are finite.
     pub fn new(width: usize, height: usize, intrinsics: [f64; 4], lens: Lens) -> Result<Self, CameraError> {
-        if !width.checked_mul(height).is_some_and(|count| (1..=MOST_PIXELS).contains(&count)) {
-            return Err(CameraError::new("size", "1 to 33554432 pixels", format!("{width}x{height}")));
-        }
+        let valid = width.checked_mul(height).is_some_and(|count| (1..=MOST_PIXELS).contains(&count));
+        CameraError::unless(valid, "size", "1 to 33554432 pixels", format_args!("{width}x{height}"))?;
         let [fx, fy, cx, cy] = intrinsics;
-        if !(fx > 0.0 && fy > 0.0 && fx.is_finite() && fy.is_finite()) {
-            return Err(CameraError::new("fx, fy", "finite focal lengths above zero", format!("{fx}, {fy}")));
-        }
-        if !(cx.is_finite() && cy.is_finite()) {
-            return Err(CameraError::new("cx, cy", "a finite principal point", format!("{cx}, {cy}")));
-        }
-        if !lens.coefficients().iter().all(|value| value.is_finite()) {
-            return Err(CameraError::new("distortion", "finite coefficients", format!("{:?}", lens.coefficients())));
-        }
+        let valid = fx > 0.0 && fy > 0.0 && fx.is_finite() && fy.is_finite();
+        CameraError::unless(valid, "fx, fy", "finite focal lengths above zero", format_args!("{fx}, {fy}"))?;
+        let valid = cx.is_finite() && cy.is_finite();
+        CameraError::unless(valid, "cx, cy", "a finite principal point", format_args!("{cx}, {cy}"))?;
+        let coefficients = lens.coefficients();
+        let valid = coefficients.iter().all(|value| value.is_finite());
+        CameraError::unless(valid, "distortion", "finite coefficients", format_args!("{coefficients:?}"))?;
         let table = OnceLock::new();
         Ok(Self { width, height, focal: [fx, fy], center: [cx, cy], lens, domain: lens.domain(), table })
     }

@@ -1,9 +1,10 @@
 //! A user-supplied detector, bound to a body.
 
-use super::{Detect, DetectError, Detected, Detection, DetectionQuery, JointMap, Surroundings, place, world_point};
+use super::{Detect, DetectError, Detected, DetectedJoint, Detection, DetectionQuery, JointMap, Surroundings, place};
 use crate::body::Body;
 use crate::math::{Aabb, Vec3, is_place};
 use crate::observation::frame::DepthImage;
+use std::fmt::Arguments;
 
 /// A detection and the position of the body's root that follows from it.
 #[derive(Clone, Debug)]
@@ -76,8 +77,7 @@ impl BoundDetector {
     ) -> Vec<PlacedDetection> {
         let Some(detector) = self.detector.as_mut() else { return Vec::new() };
         let checked = detector.detect(image, around, query).and_then(|found| {
-            let each = found.iter().enumerate();
-            each.into_iter().try_for_each(|(index, detection)| check(index, detection, &self.map, image))?;
+            found.iter().enumerate().try_for_each(|(index, detection)| check(index, detection, &self.map, image))?;
             Ok(found)
         });
         let found = match checked {
@@ -124,7 +124,8 @@ fn with_pixels(mut detection: Detection, image: &DepthImage, around: &Surroundin
         let bounds = Aabb { mins: detection.low, maxs: detection.high };
         let mut depth = Vec::new();
         around.open_depth(image, &mut depth);
-        let within = |index: &usize| bounds.contains(world_point(image, *index, depth[*index]));
+        let within =
+            |index: &usize| bounds.contains(image.world_from_sensor * image.back_project(*index, depth[*index]));
         detection.pixels = (0..depth.len()).filter(|index| depth[*index] > 0.0).filter(within).collect();
     }
     detection
@@ -132,41 +133,38 @@ fn with_pixels(mut detection: Detection, image: &DepthImage, around: &Surroundin
 
 /// Rejects a detection with invalid values.
 fn check(index: usize, detection: &Detection, map: &JointMap, image: &DepthImage) -> Result<(), DetectError> {
-    let wrong = |what: &str, expected: String, found: String| -> Result<(), DetectError> {
-        Err(format!("detection[{index}].{what}: expected {expected}, found {found}").into())
-    };
     let Detection { joints, lengths, facing, person, low, high, floor, pixels } = detection;
-    if joints.len() != map.sites.len() {
-        return wrong("joints", format!("{}, as the detector names them", map.sites.len()), joints.len().to_string());
+    let unless = |valid: bool, what: Arguments, expected: Arguments, found: Arguments| match valid {
+        true => Ok(()),
+        false => Err(DetectError::from(format!("detection[{index}].{what}: expected {expected}, found {found}"))),
+    };
+    let count = |what, found: usize, named: usize| {
+        unless(found == named, what, format_args!("{named}, as the detector names them"), format_args!("{found}"))
+    };
+    count(format_args!("joints"), joints.len(), map.sites.len())?;
+    if !lengths.is_empty() {
+        count(format_args!("lengths"), lengths.len(), map.lengths)?;
     }
-    if !lengths.is_empty() && lengths.len() != map.lengths {
-        return wrong("lengths", format!("{}, as the detector names them", map.lengths), lengths.len().to_string());
+    for (number, joint) in joints.iter().enumerate() {
+        let Some(DetectedJoint { position, sigma, visible }) = joint else { continue };
+        let (what, meters) = (format_args!("joints[{number}]"), format_args!("finite meters"));
+        unless(is_place(*position), what, meters, format_args!("{position:?}"))?;
+        let (valid, expected) = (*sigma > 0.0 && sigma.is_finite(), format_args!("finite meters > 0"));
+        unless(valid, format_args!("{what}.sigma"), expected, format_args!("{sigma}"))?;
+        let (valid, expected) = ((0.0..=1.0).contains(visible), format_args!("0 to 1"));
+        unless(valid, format_args!("{what}.visible"), expected, format_args!("{visible}"))?;
     }
-    for (number, joint) in joints.iter().enumerate().filter_map(|(number, joint)| Some((number, joint.as_ref()?))) {
-        if !is_place(joint.position) {
-            return wrong(&format!("joints[{number}]"), "finite meters".into(), format!("{:?}", joint.position));
-        }
-        if !(joint.sigma > 0.0 && joint.sigma.is_finite()) {
-            return wrong(&format!("joints[{number}].sigma"), "finite meters > 0".into(), joint.sigma.to_string());
-        }
-        if !(0.0..=1.0).contains(&joint.visible) {
-            return wrong(&format!("joints[{number}].visible"), "0 to 1".into(), joint.visible.to_string());
-        }
+    for pair in lengths {
+        let valid = pair.iter().all(|value| *value > 0.0 && value.is_finite());
+        unless(valid, format_args!("lengths"), format_args!("finite numbers > 0"), format_args!("{pair:?}"))?;
     }
-    if let Some(pair) = lengths.iter().find(|pair| !pair.iter().all(|value| *value > 0.0 && value.is_finite())) {
-        return wrong("lengths", "finite numbers > 0".into(), format!("{pair:?}"));
-    }
-    if person.is_nan() || facing.is_some_and(f64::is_nan) {
-        return wrong("person and facing", "log odds".into(), "no number".into());
-    }
-    if !(is_place(*low) && is_place(*high)) {
-        return wrong("low and high", "finite meters".into(), format!("{low:?} and {high:?}"));
-    }
-    if let Some(floor) = floor.filter(|floor| !floor.normal.is_finite() || !floor.offset.is_finite()) {
-        return wrong("floor", "finite numbers".into(), format!("{floor:?}"));
-    }
-    match pixels.iter().find(|pixel| **pixel >= image.pixels.len()) {
-        Some(pixel) => wrong("pixels", format!("indices below {}", image.pixels.len()), pixel.to_string()),
-        None => Ok(()),
-    }
+    let valid = !person.is_nan() && !facing.is_some_and(f64::is_nan);
+    unless(valid, format_args!("person and facing"), format_args!("log odds"), format_args!("no number"))?;
+    let (valid, found) = (is_place(*low) && is_place(*high), format_args!("{low:?} and {high:?}"));
+    unless(valid, format_args!("low and high"), format_args!("finite meters"), found)?;
+    let valid = floor.is_none_or(|floor| floor.normal.is_finite() && floor.offset.is_finite());
+    unless(valid, format_args!("floor"), format_args!("finite numbers"), format_args!("{floor:?}"))?;
+    let (most, below) = (pixels.iter().max().copied().unwrap_or_default(), image.pixels.len());
+    let expected = format_args!("indices below {below}");
+    unless(pixels.is_empty() || most < below, format_args!("pixels"), expected, format_args!("{most}"))
 }

@@ -2,14 +2,8 @@
 
 use super::skeleton::Skeleton;
 use super::{DetectedJoint, Detection};
-use crate::body::{Body, JointRole, Side};
+use crate::body::{Body, JointRole};
 
-/// A joint that exists on both sides.
-type SideJoint = fn(Side) -> JointRole;
-/// Joints that give the trunk's position and orientation.
-const TRUNK: [SideJoint; 2] = [JointRole::Shoulder, JointRole::Hip];
-const LEGS: [SideJoint; 2] = [JointRole::Knee, JointRole::Ankle];
-const ANKLES: [SideJoint; 1] = [JointRole::Ankle];
 const STATURE: &str = "stature";
 
 /// Mapping of a detector's joints and lengths to a body. Joints and lengths are numbered in the detector's order.
@@ -21,15 +15,16 @@ pub(crate) struct JointMap {
     pub(super) lengths: usize,
     /// Joints and lengths of a person's skeleton.
     pub(super) skeleton: Skeleton,
-    root: Option<usize>,
-    trunk: Vec<usize>,
-    legs: Vec<usize>,
-    ankles: Vec<usize>,
+    /// Joints that give the trunk's position and orientation; for a body without shoulders and hips, all joints that it has.
+    pub(crate) trunk: Vec<usize>,
+    /// Knees and ankles.
+    pub(super) legs: Vec<usize>,
     /// For every limb: the joint to its parent, the other joints on it, and its length.
     hangs_by: Vec<Option<usize>>,
     on_limb: Vec<Vec<usize>>,
     length_of_limb: Vec<Option<usize>>,
-    stature: Option<usize>,
+    /// The stature, if the detector reports it.
+    pub(crate) stature: Option<usize>,
 }
 
 impl JointMap {
@@ -41,11 +36,11 @@ impl JointMap {
             |role: JointRole| (0..sites.len()).find(|index| named[*index] == Some(role) && sites[*index].is_some());
         let joint_of_site = |site: usize| sites.iter().position(|own| *own == Some(site));
         let length = |name: &str| lengths.iter().position(|length| length == name);
+        let skeleton = Skeleton::new(joint, length);
+        let Skeleton { arms, legs, .. } = &skeleton;
         // Left before right, because sums depend on the order.
-        let of_sides = |of: &[SideJoint]| -> Vec<usize> {
-            of.iter().flat_map(|of| Side::BOTH.map(|side| joint(of(side)))).flatten().collect()
-        };
-        let mut trunk = of_sides(&TRUNK);
+        let shoulders = arms.iter().map(|arm| arm[0]);
+        let mut trunk: Vec<usize> = shoulders.chain(legs.iter().map(|leg| leg[0])).flatten().collect();
         if trunk.is_empty() {
             trunk = (0..joints.len()).filter(|index| sites[*index].is_some()).collect();
         }
@@ -58,11 +53,9 @@ impl JointMap {
                 .collect()
         };
         Self {
-            skeleton: Skeleton::new(joint, length),
-            root: joint(JointRole::Root),
             trunk,
-            legs: of_sides(&LEGS),
-            ankles: of_sides(&ANKLES),
+            legs: [1, 2].into_iter().flat_map(|joint| legs.map(|leg| leg[joint])).flatten().collect(),
+            skeleton,
             hangs_by: limbs.clone().map(|limb| roles.joint_site(limb).and_then(joint_of_site)).collect(),
             on_limb: limbs.clone().map(on_limb).collect(),
             length_of_limb: limbs.map(|limb| length(length_of(roles.joint(limb)))).collect(),
@@ -77,29 +70,9 @@ impl JointMap {
         self.sites.get(joint).copied().flatten()
     }
 
-    /// Joints that give the trunk's position and orientation; for a body without shoulders and hips, all joints that it has.
-    pub(crate) fn trunk(&self) -> &[usize] {
-        &self.trunk
-    }
-
-    /// Knees and ankles.
-    pub(crate) fn legs(&self) -> &[usize] {
-        &self.legs
-    }
-
-    /// The length of every limb of the body, if the detector reports it. All parts of the trunk share one length.
-    pub(crate) fn length_of_limb(&self) -> &[Option<usize>] {
-        &self.length_of_limb
-    }
-
-    /// The stature, if the detector reports it.
-    pub(crate) fn stature(&self) -> Option<usize> {
-        self.stature
-    }
-
-    /// The joint that is the body's root, if the detector reports it.
-    pub(super) fn root(&self) -> Option<usize> {
-        self.root
+    /// The length of a limb of the body, if the detector reports it. All parts of the trunk share one length.
+    pub(crate) fn length_of_limb(&self, limb: usize) -> Option<usize> {
+        self.length_of_limb.get(limb).copied().flatten()
     }
 }
 
@@ -148,11 +121,6 @@ impl<'a> Detected<'a> {
 
     /// The detected ankles.
     pub(crate) fn ankles(&self) -> impl Iterator<Item = &'a DetectedJoint> + '_ {
-        self.map.ankles.iter().filter_map(|joint| self.joint(*joint))
-    }
-
-    /// The length with this index, and its relative standard deviation.
-    pub(crate) fn length(&self, index: usize) -> Option<[f64; 2]> {
-        self.detection.lengths.get(index).copied()
+        self.map.skeleton.legs.iter().filter_map(|leg| self.joint(leg[2]?))
     }
 }

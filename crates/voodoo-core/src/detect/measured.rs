@@ -2,7 +2,7 @@
 //! is not the body's: legs in a skirt, a trunk under a backpack.
 
 use super::{Detected, DetectedJoint};
-use crate::association::correspondence::{Correspondences, DetectedPair};
+use crate::association::correspondence::DetectedPair;
 use crate::body::Body;
 use crate::math::{Points, Pose, Vec3, refill, reset};
 
@@ -13,22 +13,12 @@ const EXCESS_GAIN: f64 = 5.0;
 /// Scale of the kernel of a point's distance from the limb that was detected, in standard deviations of the detected joints.
 const OWN_SIGMAS: f64 = 4.0;
 
-/// A detected joint of the body: its site, its position, world frame, its standard deviation along each axis, meters, and its
-/// information, 1/m^2.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct MeasuredJoint {
-    site: usize,
-    position: Vec3,
-    sigma: f64,
-    information: f64,
-}
-
 impl Detected<'_> {
     /// How far trunk and legs at these poses, working frame, are from where they were detected: the mean squared deviation in
     /// space, in variances, beyond the one that is expected; from 0 to 1.
     fn excess_deviation(&self, body: &Body, poses: &[Pose], origin: Vec3) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0_f64);
-        for joint in self.map.trunk().iter().chain(self.map.legs()) {
+        for joint in self.map.trunk.iter().chain(&self.map.legs) {
             if let (Some(joint), Some(site)) = (self.joint(*joint), self.map.site(*joint)) {
                 let apart = body.site_position(poses, site) + origin - joint.position;
                 sum += apart.length_squared() / (3.0 * joint.sigma * joint.sigma);
@@ -57,12 +47,12 @@ impl Detected<'_> {
         bones.sort_unstable_by_key(|bone| bone.limb);
     }
 
-    /// Writes the joints to `joints`, for a body that is expected at these poses, working frame.
-    pub(crate) fn measure(&self, body: &Body, poses: &[Pose], origin: Vec3, joints: &mut Vec<MeasuredJoint>) {
+    /// Pairs the joints of a body that is expected at these poses, working frame, with the detected ones.
+    pub(crate) fn measure(&self, body: &Body, poses: &[Pose], origin: Vec3, pairs: &mut Vec<DetectedPair>) {
         let factor = 1.0 + EXCESS_GAIN * self.excess_deviation(body, poses, origin);
-        joints.extend(self.on_sites().map(|(site, joint)| {
+        pairs.extend(self.on_sites().map(|(site, joint)| {
             let DetectedJoint { position, sigma, visible } = *joint;
-            MeasuredJoint { site, position, sigma, information: visible * factor / (sigma * sigma) }
+            DetectedPair { site, p: position - origin, sigma, information: visible * factor / (sigma * sigma) }
         }));
     }
 }
@@ -115,18 +105,6 @@ impl DetectedBone {
     }
 }
 
-impl Correspondences {
-    /// Pairs the body's joints with the detected ones.
-    pub(crate) fn add_detected(&mut self, body: &Body, poses: &[Pose], joints: &[MeasuredJoint], origin: Vec3) {
-        self.detected.clear();
-        self.detected.extend(joints.iter().map(|joint| {
-            let MeasuredJoint { site, position, sigma, information } = *joint;
-            let (limb, local) = (body.sites()[site].limb, body.sites()[site].position);
-            DetectedPair { limb, local, x: poses[limb] * local, p: position - origin, sigma, information }
-        }));
-    }
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
@@ -135,7 +113,7 @@ mod tests {
     use crate::testing::{moved, standing};
 
     /// The measured joints of a detection at the poses of the standing body moved by `aside`, for the standing body.
-    fn measured(aside: Vec3, sigma: f64) -> Vec<MeasuredJoint> {
+    fn measured(aside: Vec3, sigma: f64) -> Vec<DetectedPair> {
         let (model, poses) = standing();
         let (body, origin, there) = (&model.body, Vec3::X, moved(&poses, aside));
         let names: Vec<String> = body.sites().iter().map(|site| site.name.clone()).collect();

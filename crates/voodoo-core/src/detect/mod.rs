@@ -11,11 +11,11 @@ mod skeleton;
 
 pub(crate) use bound::{BoundDetector, PlacedDetection};
 pub(crate) use joint_map::{Detected, JointMap};
-pub(crate) use measured::{DetectedLimbs, MeasuredJoint};
+pub(crate) use measured::DetectedLimbs;
 pub(crate) use placement::{fit_body, fit_pose, is_sized_like, place};
 
 use crate::body::Body;
-use crate::math::{Aabb, Pose, Vec3};
+use crate::math::{Aabb, Vec3, refill};
 use crate::observation::background::Background;
 use crate::observation::frame::{DepthImage, Ground};
 use crate::observation::ownership::NO_OWNER;
@@ -240,18 +240,11 @@ impl Surroundings<'_> {
     /// Writes the depth of every pixel of an image, meters. It is 0 where there is no return, and where the return is known not
     /// to belong to a requested person.
     pub fn open_depth(&self, image: &DepthImage, depth: &mut Vec<f32>) {
-        depth.clear();
-        depth.extend((0..image.pixels.len()).map(|index| {
-            let z = image.pixels.get(index) * image.meters_per_unit as f32;
-            let open = z > 0.0 && z.is_finite() && !self.explains(index, z);
-            let excluded = || self.excludes(world_point(image, index, z));
-            if open && (self.excluded.is_empty() || !excluded()) { z } else { 0.0 }
-        }));
+        let open_pixel = |index| {
+            let excluded = |z| self.excludes(image.world_from_sensor * image.back_project(index, z));
+            let open = |z: &f32| !self.explains(index, *z) && (self.excluded.is_empty() || !excluded(*z));
+            image.depth(index).filter(open).unwrap_or(0.0)
+        };
+        refill(depth, (0..image.pixels.len()).map(open_pixel));
     }
-}
-
-/// World position of a pixel at a depth of `z` meters.
-fn world_point(image: &DepthImage, index: usize, z: f32) -> Vec3 {
-    let world_from_sensor: &Pose = &image.world_from_sensor;
-    *world_from_sensor * image.back_project(index, z)
 }

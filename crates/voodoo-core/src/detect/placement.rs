@@ -1,12 +1,13 @@
 //! Places a body at a detected person.
 
 use super::Detected;
-use crate::body::{Body, Model};
+use crate::body::Body;
 use crate::math::{Pose, Vec3};
 
-/// Returns a body with a detected person's sizes (equal on both sides), and the pose that fits the joints best, world frame.
-pub(crate) fn fit_body(model: &Model, detected: Detected) -> Option<(Body, Vec<Pose>)> {
-    let body = with_sizes(&model.reference_body, detected)?;
+/// Returns a body like `reference` with a detected person's sizes (equal on both sides), and the pose that fits the joints best,
+/// world frame.
+pub(crate) fn fit_body(reference: &Body, detected: Detected) -> Option<(Body, Vec<Pose>)> {
+    let body = with_sizes(reference, detected)?;
     let poses = fit_pose(&body, detected)?;
     Some((body, poses))
 }
@@ -21,7 +22,7 @@ pub(crate) fn fit_pose(body: &Body, detected: Detected) -> Option<Vec<Pose>> {
 
 /// Position of a detected person's root, world frame: the detected root joint, else the root of the fitted body.
 pub(crate) fn place(body: &Body, detected: Detected) -> Option<Vec3> {
-    match detected.map.root().and_then(|root| detected.joint(root)) {
+    match detected.map.skeleton.root.and_then(|root| detected.joint(root)) {
         Some(root) => Some(root.position),
         None => fit_pose(body, detected).and_then(|poses| poses.first().map(|root| root.translation)),
     }
@@ -55,7 +56,7 @@ fn with_sizes(reference: &Body, detected: Detected) -> Option<Body> {
     if lengths.iter().all(Option::is_none) {
         return Some(reference.clone());
     }
-    let stature = map.stature().and_then(|stature| detection.lengths.get(stature));
+    let stature = map.stature.and_then(|stature| detection.lengths.get(stature));
     let grown = stature.map(|[stature, _]| reference.with_proportions_of(*stature));
     let reference = grown.as_ref().unwrap_or(reference);
     let mut joints = at_rest(reference, &map.sites);

@@ -15,13 +15,13 @@ pub(super) type OptionalLengths = [Option<f64>; COUNT];
 /// Indices of a detector's joints and lengths; `None` for those that the detector does not report.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Skeleton {
-    root: Option<usize>,
+    pub(super) root: Option<usize>,
     top: Option<usize>,
     head: Option<usize>,
     /// Shoulder, elbow, wrist and hand of the left and the right arm.
-    arms: [[Option<usize>; 4]; 2],
+    pub(super) arms: [[Option<usize>; 4]; 2],
     /// Hip, knee and ankle.
-    legs: [[Option<usize>; 3]; 2],
+    pub(super) legs: [[Option<usize>; 3]; 2],
     lengths: [Option<usize>; COUNT],
 }
 

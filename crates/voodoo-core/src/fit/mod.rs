@@ -11,11 +11,11 @@ pub(crate) use motion::{Motion, UNKNOWN_MOTION};
 use crate::association::assignment::{Assignment, match_limb};
 use crate::association::buried::Buried;
 use crate::association::contour::Contours;
-use crate::association::correspondence::{Correspondences, LimbMatches};
+use crate::association::correspondence::{Correspondences, DetectedPair, LimbMatches};
 use crate::association::visible_side::match_visible_side;
 use crate::body::{Body, Pair};
 use crate::config::Config;
-use crate::detect::{Detected, DetectedLimbs, MeasuredJoint};
+use crate::detect::{Detected, DetectedLimbs};
 use crate::error::TrackError;
 use crate::math::{Pose, Vec3, refill};
 use crate::regions;
@@ -40,7 +40,7 @@ pub(crate) struct Fit {
     /// The colors of limbs and surroundings.
     pub(crate) regions: regions::ColorRegions,
     /// Joints that a detector found in this frame, and where it found the limbs.
-    detected: Vec<MeasuredJoint>,
+    detected: Vec<DetectedPair>,
     detected_limbs: DetectedLimbs,
     /// Variance of each limb's radius, square meters.
     radius_variances: Vec<f64>,
@@ -217,7 +217,7 @@ impl Fit {
     fn match_sites(&mut self, context: Context, poses: &[Pose]) {
         let (frame, origin) = (context.observation.frame(), context.observation.origin());
         self.correspondences.add_sites(&context.model.body, poses, frame, origin);
-        self.correspondences.add_detected(&context.model.body, poses, &self.detected, origin);
+        self.correspondences.detected.clone_from(&self.detected);
     }
 
     fn assign(&mut self, context: Context, poses: &[Pose], gate: &Gate) {

@@ -68,7 +68,7 @@ impl RoughSearch {
     pub(super) fn begin(&mut self, at: Extremity) {
         let Self { unexplained, sample, others, distances, .. } = self;
         sample.clear();
-        sample.extend(unexplained);
+        sample.extend(&unexplained.points, &unexplained.weights);
         for limb in at.chain.limbs() {
             let matches = &at.matched.correspondences.limbs[limb];
             for (index, weight) in matches.weight.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {

@@ -2,11 +2,11 @@
 
 use nalgebra::{Matrix4, SymmetricEigen};
 
-use crate::math::{Mat3, Pose, Quat, Vec3};
+use crate::math::{Pose, Quat, Vec3};
 
 /// Weighted moments of point pairs `(x, p)`, which are sufficient for absolute orientation. A repeated pair is added once, with a
 /// multiple of its weight.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Moments {
     /// Sum of the weights.
     pub weight: f64,
@@ -14,15 +14,8 @@ pub(crate) struct Moments {
     pub x: Vec3,
     /// Weighted sum of the measured points.
     pub p: Vec3,
-    /// Weighted sum of `p x^T`.
-    pub px: Mat3,
-}
-
-impl Default for Moments {
-    /// No pairs. (The default of a glam matrix is the identity, so this cannot be derived.)
-    fn default() -> Self {
-        Self { weight: 0.0, x: Vec3::ZERO, p: Vec3::ZERO, px: Mat3::ZERO }
-    }
+    /// Weighted sum of `p x^T`, column by column.
+    pub px: [Vec3; 3],
 }
 
 impl Moments {
@@ -31,7 +24,7 @@ impl Moments {
         self.weight += weight;
         self.x += weight * x;
         self.p += weight * p;
-        self.px += Mat3::from_cols((weight * x.x) * p, (weight * x.y) * p, (weight * x.z) * p);
+        (0..3).for_each(|axis| self.px[axis] += (weight * x[axis]) * p);
     }
 
     /// The rigid motion `p_from_x` with the least weighted sum of squared distances, `None` without weight.
@@ -45,9 +38,9 @@ impl Moments {
         }
         let (mean_x, mean_p) = (self.x / self.weight, self.p / self.weight);
         // Cross-covariance sum w (x - mx)(p - mp)^T, transposed to S[row x][column p] as Horn writes it.
-        let centerd = self.px - Mat3::from_cols(mean_x.x * self.p, mean_x.y * self.p, mean_x.z * self.p);
+        let centered = [0, 1, 2].map(|axis| self.px[axis] - mean_x[axis] * self.p);
         let stay = 1e-6 * self.weight * stay * stay;
-        let s = |x: usize, p: usize| centerd.col(x)[p] + if x == p { stay } else { 0.0 };
+        let s = |x: usize, p: usize| centered[x][p] + if x == p { stay } else { 0.0 };
         // Horn's symmetric matrix N; the eigenvector of its largest eigenvalue is the quaternion (w, x, y, z).
         let [x, y, z] = [0, 1, 2].map(|axis| s(axis, axis));
         let [yz, zx, xy] = [(1, 2), (2, 0), (0, 1)].map(|(a, b)| s(a, b) + s(b, a));

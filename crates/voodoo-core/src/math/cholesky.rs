@@ -9,43 +9,49 @@ use super::simd::vectorized;
 /// (Featherstone, "Rigid Body Dynamics Algorithms", 2008, section 6.5), so entries between unknowns on different branches stay
 /// zero and are skipped.
 pub fn solve_in_place(h: &mut [f64], b: &mut [f64], n: usize) -> bool {
-    factor(h, n) && vectorized!(substitute_lanes(h, b, n))
+    factor(h, n)
+        && vectorized!({
+            half_substitute_lanes(h, b, n);
+            for k in 0..n {
+                let (known, rest) = b.split_at_mut(k);
+                let dot: f64 = known.iter().zip(&h[k * n..]).map(|(b, factor)| b * factor).sum();
+                rest[0] = (rest[0] - dot) / h[k * n + k];
+            }
+            b[..n].iter().all(|value| value.is_finite())
+        })
 }
 
 /// The first half of [`solve_in_place`], to be used with several right-hand sides: `h` becomes `L`.
 pub(crate) fn factor(h: &mut [f64], n: usize) -> bool {
-    vectorized!(factor_lanes(h, n))
+    vectorized!({
+        for k in (0..n).rev() {
+            let (before, rest) = h.split_at_mut(k * n);
+            let row = &mut rest[..=k];
+            let square = row[k];
+            if square.is_nan() || square <= 0.0 {
+                return false;
+            }
+            let root = square.sqrt();
+            row[k] = root;
+            let row = &mut row[..k];
+            row.iter_mut().for_each(|value| *value /= root);
+            for i in 0..k {
+                let factor = row[i];
+                if factor != 0.0 {
+                    for (value, other) in before[i * n..=i * n + i].iter_mut().zip(&*row) {
+                        *value -= factor * other;
+                    }
+                }
+            }
+        }
+        true
+    })
 }
 
 /// The first of the two substitutions, for every right-hand side: `b` becomes `y` with `L^T y = b`, where `l` is the result of
 /// [`factor`]. For two right-hand sides, `y_1^T y_2 = b_1^T h^-1 b_2`.
 pub(crate) fn half_substitute(l: &[f64], b: &mut [f64], n: usize) {
     vectorized!(half_substitute_lanes(l, b, n));
-}
-
-#[inline(always)]
-fn factor_lanes(h: &mut [f64], n: usize) -> bool {
-    for k in (0..n).rev() {
-        let (before, rest) = h.split_at_mut(k * n);
-        let row = &mut rest[..=k];
-        let square = row[k];
-        if square.is_nan() || square <= 0.0 {
-            return false;
-        }
-        let root = square.sqrt();
-        row[k] = root;
-        let row = &mut row[..k];
-        row.iter_mut().for_each(|value| *value /= root);
-        for i in 0..k {
-            let factor = row[i];
-            if factor != 0.0 {
-                for (value, other) in before[i * n..=i * n + i].iter_mut().zip(&*row) {
-                    *value -= factor * other;
-                }
-            }
-        }
-    }
-    true
 }
 
 #[inline(always)]
@@ -57,18 +63,6 @@ fn half_substitute_lanes(l: &[f64], b: &mut [f64], n: usize) {
             *b -= factor * value;
         }
     }
-}
-
-/// The second half of [`solve_in_place`]: `h` is the result of [`factor`].
-#[inline(always)]
-fn substitute_lanes(h: &[f64], b: &mut [f64], n: usize) -> bool {
-    half_substitute_lanes(h, b, n);
-    for k in 0..n {
-        let (known, rest) = b.split_at_mut(k);
-        let dot: f64 = known.iter().zip(&h[k * n..]).map(|(b, factor)| b * factor).sum();
-        rest[0] = (rest[0] - dot) / h[k * n + k];
-    }
-    b[..n].iter().all(|value| value.is_finite())
 }
 
 #[cfg(test)]

@@ -6,11 +6,12 @@
 //! * a transform is named `a_from_b` and maps coordinates in `b` to coordinates in `a`;
 //! * a twist is `(omega, v)`, radians and meters, and perturbs on the left: `T' = exp(xi) T`.
 
+use glam::DMat4;
 pub use glam::{DAffine3 as Affine3, DMat3 as Mat3, DQuat as Quat, DVec3 as Vec3};
 use std::ops::Mul;
 
 /// A rigid transform: a rotation, then a translation.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pose {
     /// A unit quaternion.
@@ -83,12 +84,6 @@ impl Pose {
     #[inline]
     pub fn is_finite(&self) -> bool {
         self.rotation.is_finite() && self.translation.is_finite()
-    }
-}
-
-impl Default for Pose {
-    fn default() -> Self {
-        Self::IDENTITY
     }
 }
 
@@ -191,10 +186,7 @@ pub(crate) fn is_rigid(pose: &Pose) -> bool {
 
 /// A pose as the rows of a 4x4 matrix.
 pub fn matrix(pose: &Pose) -> [[f64; 4]; 4] {
-    let rows = Mat3::from_quat(pose.rotation).transpose().to_cols_array_2d();
-    let t = pose.translation;
-    let row = |index: usize, shift: f64| [rows[index][0], rows[index][1], rows[index][2], shift];
-    [row(0, t.x), row(1, t.y), row(2, t.z), [0.0, 0.0, 0.0, 1.0]]
+    DMat4::from_rotation_translation(pose.rotation, pose.translation).transpose().to_cols_array_2d()
 }
 
 /// Single-precision points as a structure of arrays, the layout the SIMD kernels read. Meters.

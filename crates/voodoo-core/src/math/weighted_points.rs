@@ -35,21 +35,12 @@ impl WeightedPoints {
         self.weights.push(weight);
     }
 
-    /// Appends all points of `other`.
-    pub(crate) fn extend(&mut self, other: &Self) {
-        self.points.x.extend_from_slice(&other.points.x);
-        self.points.y.extend_from_slice(&other.points.y);
-        self.points.z.extend_from_slice(&other.points.z);
-        self.weights.extend_from_slice(&other.weights);
-    }
-
-    /// Replaces the contents by a set of points with single-precision weights.
-    pub(crate) fn assign(&mut self, points: &Points, weights: &[f32]) {
-        self.clear();
+    /// Appends points with their weights.
+    pub(crate) fn extend<W: Copy + Into<f64>>(&mut self, points: &Points, weights: &[W]) {
         self.points.x.extend_from_slice(&points.x);
         self.points.y.extend_from_slice(&points.y);
         self.points.z.extend_from_slice(&points.z);
-        self.weights.extend(weights.iter().map(|weight| f64::from(*weight)));
+        self.weights.extend(weights.iter().map(|weight| (*weight).into()));
     }
 
     /// Sum of the weights.
@@ -105,8 +96,8 @@ mod tests {
         let mut points = Points::default();
         points.push([0.1, 0.2, 0.3]);
         let mut copy = WeightedPoints::default();
-        copy.assign(&points, &[0.7]);
-        copy.extend(&copy.clone());
+        copy.extend(&points, &[0.7_f32]);
+        copy.extend(&points, &[0.7_f32]);
         assert_eq!(copy.len(), 2);
         assert_eq!((copy.points.x[1], copy.weights[1]), (0.1, f64::from(0.7_f32)));
     }

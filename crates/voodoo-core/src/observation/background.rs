@@ -3,7 +3,7 @@
 use crate::math::{Pose, refill};
 use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::observer::Own;
-use crate::observation::ownership::OwnershipMask;
+use crate::observation::ownership::{NO_OWNER, OwnershipMask};
 
 /// A pixel belongs to the background unless it lies more than this in front of it: meters, plus a fraction of the depth, because
 /// the noise of depth cameras grows with depth.
@@ -17,7 +17,7 @@ pub(crate) const OTHERS: f32 = f32::MIN_POSITIVE;
 /// Depth of the scene behind the body, one value per pixel; 0 where it is unknown.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Background {
-    pub(super) world_from_sensor: Option<Pose>,
+    pub(super) world_from_sensor: Pose,
     pub(super) width: usize,
     pub(super) depth: Vec<f32>,
     /// The ray `(x/z, y/z)` on which each depth was observed; empty while the camera has not moved: then it is the ray through
@@ -53,8 +53,7 @@ impl Background {
 
     /// Whether this background belongs to the image: to the same camera at the same pose.
     pub(super) fn fits(&self, image: &DepthImage) -> bool {
-        self.is_sized_like(image)
-            && self.world_from_sensor.is_some_and(|known| is_static(&known, &image.world_from_sensor))
+        self.is_sized_like(image) && is_static(&self.world_from_sensor, &image.world_from_sensor)
     }
 
     pub(super) fn is_sized_like(&self, image: &DepthImage) -> bool {
@@ -87,7 +86,7 @@ impl Backgrounds {
     /// Becomes the scene as one person sees it: with what other persons explain hidden. A frame without images keeps what is known
     /// of the cameras.
     pub(super) fn mask(&mut self, frame: &Frame, ownership: OwnershipMask) {
-        let is_others = |owner: &u16| ownership.is_others(*owner);
+        let is_others = |owner: &u16| *owner != NO_OWNER && *owner != ownership.own;
         self.others.resize_with(ownership.cloud_owners.len(), Vec::new);
         for (others, owners) in self.others.iter_mut().zip(ownership.cloud_owners) {
             refill(others, owners.iter().map(is_others));
@@ -97,7 +96,7 @@ impl Backgrounds {
         }
         self.images.resize_with(frame.images.len(), Background::default);
         for (number, (image, own)) in frame.images.iter().zip(&mut self.images).enumerate() {
-            (own.world_from_sensor, own.width) = (Some(image.world_from_sensor), image.camera.width());
+            (own.world_from_sensor, own.width) = (image.world_from_sensor, image.camera.width());
             refill(&mut own.depth, ownership.scene.depth(image).iter().copied());
             own.depth.resize(image.pixels.len(), 0.0);
             for (depth, owner) in own.depth.iter_mut().zip(ownership.owners(number)) {
@@ -106,7 +105,8 @@ impl Backgrounds {
         }
     }
 
-    /// Sets the learned depth to unknown at pixels that show a person. Depths learned behind the person stay.
+    /// Sets the learned depth to unknown at pixels that show a person. Depths learned behind the person stay: without them, the
+    /// background would look like a flat body once the person is gone.
     pub(crate) fn release(&mut self, frame: &Frame, own: Own) {
         let Some(image) = frame.images.get(own.image) else { return };
         let Some(depth) = self.depth_mut(image) else { return };

@@ -3,7 +3,7 @@
 use super::background::{Background, Backgrounds, pose_difference};
 use super::candidates::columns_f32;
 use super::frame::{DepthImage, Frame};
-use crate::math::{Pose, Vec3, reset};
+use crate::math::{Vec3, reset};
 
 /// A camera that moved by more than this between two images counts as a different camera: meters, and radians.
 const LEAPS: (f64, f64) = (0.5, 0.5);
@@ -18,10 +18,10 @@ impl Backgrounds {
     /// the slot of a background that no image of the frame has.
     pub(super) fn carry_over(&mut self, image: &DepthImage, frame: &Frame) -> bool {
         let gone = |background: &Background| !frame.images.iter().any(|image| background.fits(image));
-        let from = |background: &Background| background.world_from_sensor.filter(|_| background.is_sized_like(image));
         let leap = |background: &Background| {
-            let (meters, radians) = pose_difference(&from(background)?, &image.world_from_sensor);
-            (meters <= LEAPS.0 && radians <= LEAPS.1).then_some(meters / LEAPS.0 + radians / LEAPS.1)
+            let (meters, radians) = pose_difference(&background.world_from_sensor, &image.world_from_sensor);
+            let is_near = background.is_sized_like(image) && meters <= LEAPS.0 && radians <= LEAPS.1;
+            is_near.then_some(meters / LEAPS.0 + radians / LEAPS.1)
         };
         let left = (0..self.images.len()).filter(|index| gone(&self.images[*index]));
         let nearest = left
@@ -34,31 +34,26 @@ impl Backgrounds {
             self.images.push(Background::default());
         }
         let background = &mut self.images[index];
-        let before = background.world_from_sensor.filter(|_| nearest.is_some());
-        match &before {
-            Some(before) => background.move_to(image, before),
-            None => background.forget(image),
+        if nearest.is_some() {
+            background.move_to(image);
+        } else {
+            reset(&mut background.depth, image.pixels.len(), 0.0);
+            background.rays.clear();
         }
-        background.world_from_sensor = Some(image.world_from_sensor);
+        background.world_from_sensor = image.world_from_sensor;
         background.width = image.camera.width();
-        before.is_some()
+        nearest.is_some()
     }
 }
 
 impl Background {
-    /// Resets all depths of this image to unknown.
-    fn forget(&mut self, image: &DepthImage) {
-        reset(&mut self.depth, image.pixels.len(), 0.0);
-        self.rays.clear();
-    }
-
     /// Reprojects the learned surfaces into the camera at its current pose; each pixel keeps the nearest surface that falls into
     /// it.
     ///
     /// A surface stays on the ray on which it was observed instead of moving to the pixel center, so that rounding errors do not
     /// accumulate.
-    fn move_to(&mut self, image: &DepthImage, before: &Pose) {
-        let moved = image.world_from_sensor.inverse() * *before;
+    fn move_to(&mut self, image: &DepthImage) {
+        let moved = image.world_from_sensor.inverse() * self.world_from_sensor;
         let turn = columns_f32(&moved);
         let camera = image.camera;
         let width = camera.width();
@@ -103,7 +98,7 @@ pub(super) const NO_RAY: [f32; 2] = [f32::INFINITY; 2];
 mod tests {
     use super::*;
     use crate::camera::{Camera, Lens};
-    use crate::math::Quat;
+    use crate::math::{Pose, Quat};
     use crate::observation::frame::DepthPixels;
     use crate::testing::learn;
 

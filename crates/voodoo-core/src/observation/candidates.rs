@@ -65,13 +65,18 @@ impl Candidates {
         let gate =
             PointGate { low: to_f32(bounds.mins), high: to_f32(bounds.maxs), up: to_f32(up), floor: floor as f32 };
         for view in views.iter() {
+            let first = self.points.len();
             self.gather_image(&view, bounds, &gate, config.max_points);
+            self.leave_out(first, frame.excluded, origin);
             self.cameras.push((self.points.len() as u32, view.working_from_camera.translation));
         }
         for (number, cloud) in frame.clouds.iter().enumerate() {
+            let first = self.points.len();
             self.gather_cloud(cloud, origin, &gate, |point| backgrounds.is_others(number, point));
+            if !matches!(cloud.scope, Scope::Limb(_)) {
+                self.leave_out(first, frame.excluded, origin);
+            }
         }
-        self.leave_out(frame.excluded, origin);
         self.clusters.arrange(&self.points);
         self.thin();
     }
@@ -123,29 +128,21 @@ impl Candidates {
         self.source.push(source);
     }
 
-    /// Drops the points inside the given boxes of the world.
-    fn leave_out(&mut self, boxes: &[Aabb], origin: Vec3) {
+    /// Drops those points of one source, the last ones from `first` on, that lie inside the given boxes of the world.
+    fn leave_out(&mut self, first: usize, boxes: &[Aabb], origin: Vec3) {
         if boxes.is_empty() {
             return;
         }
-        let (mut kept, mut camera) = (0, 0);
-        for index in 0..self.points.len() {
-            while self.cameras.get(camera).is_some_and(|(end, _)| *end as usize == index) {
-                self.cameras[camera].0 = kept as u32;
-                camera += 1;
-            }
+        let mut kept = first;
+        for index in first..self.points.len() {
             let point = self.points.get(index) + origin;
-            let measured = self.limb[index] != ANY_LIMB;
-            if measured || !boxes.iter().any(|bounds| bounds.contains(point)) {
-                let [x, y, z] = [self.points.x[index], self.points.y[index], self.points.z[index]];
-                self.points.set(kept, [x, y, z]);
-                self.weight[kept] = self.weight[index];
-                self.limb[kept] = self.limb[index];
-                self.source[kept] = self.source[index];
+            if !boxes.iter().any(|bounds| bounds.contains(point)) {
+                let Points { x, y, z } = &self.points;
+                self.points.set(kept, [x[index], y[index], z[index]]);
                 kept += 1;
             }
         }
-        self.cameras[camera..].iter_mut().for_each(|(end, _)| *end = kept as u32);
+        // Weight, limb and source are the same for all of them.
         self.points.resize(kept);
         self.weight.truncate(kept);
         self.limb.truncate(kept);

@@ -56,7 +56,8 @@ pub(crate) struct Observer {
     masked: Backgrounds,
     is_masked: bool,
     segmented: Vec<bool>,
-    candidates: Candidates,
+    /// The candidates of the last frame.
+    pub candidates: Candidates,
     /// Whether a frame had depth images.
     has_images: bool,
 }
@@ -87,21 +88,22 @@ impl Observer {
     }
 
     /// Step 1 (K06 IV-B.1): keeps the points in the enlarged box of the whole body, without the scene and the pixels that other
-    /// persons explain.
-    pub(crate) fn gather(
-        &mut self,
-        frame: &Frame,
+    /// persons explain. Returns the observation of `frame`.
+    pub(crate) fn gather<'a>(
+        &'a mut self,
+        frame: &'a Frame<'a>,
         origin: Vec3,
         bounds: &Aabb,
-        ownership: OwnershipMask,
+        ownership: OwnershipMask<'a>,
         config: &Config,
-    ) {
-        let backgrounds = if self.is_masked { &self.masked } else { ownership.scene };
-        let views = DepthViews { frame, backgrounds, segmented: &self.segmented, origin };
-        self.candidates.gather(views, bounds, config);
+    ) -> Observation<'a> {
+        let mut candidates = std::mem::take(&mut self.candidates);
+        candidates.gather(self.observation(frame, origin, ownership).views, bounds, config);
+        self.candidates = candidates;
+        self.observation(frame, origin, ownership)
     }
 
-    /// The observation of `frame`.
+    /// The observation of `frame`, with the candidates that were gathered last.
     pub(crate) fn observation<'a>(
         &'a self,
         frame: &'a Frame<'a>,
@@ -116,11 +118,6 @@ impl Observer {
     /// Whether the frame has no depth image although earlier frames had: this is no evidence that the body left.
     pub(crate) fn silent(&self, frame: &Frame) -> bool {
         frame.images.is_empty() && self.has_images
-    }
-
-    /// The candidates of the last frame.
-    pub(crate) fn candidates(&self) -> &Candidates {
-        &self.candidates
     }
 }
 
@@ -148,6 +145,6 @@ mod tests {
         observer.begin(&nothing, everything(&Backgrounds::default()));
         assert!(observer.silent(&nothing) && !with_frame(&pixels, 1.0, |frame| observer.silent(frame)));
         observer.clear();
-        assert!(!observer.silent(&nothing) && observer.candidates().is_empty());
+        assert!(!observer.silent(&nothing) && observer.candidates.is_empty());
     }
 }

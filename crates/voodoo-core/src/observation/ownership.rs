@@ -25,9 +25,4 @@ impl<'a> OwnershipMask<'a> {
     pub(crate) fn owners(&self, image: usize) -> &'a [u16] {
         self.owners.get(image).map_or(&[], Vec::as_slice)
     }
-
-    /// Whether a pixel with this owner shows another person.
-    pub(crate) fn is_others(&self, owner: u16) -> bool {
-        owner != NO_OWNER && owner != self.own
-    }
 }

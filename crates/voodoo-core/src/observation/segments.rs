@@ -1,7 +1,7 @@
 //! Cuts the foreground of a frame into connected segments: each may be a lost body.
 
 use crate::config::Config;
-use crate::math::{Aabb, Vec3, reset};
+use crate::math::{Aabb, Vec3};
 use crate::observation::background::Background;
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::depth_view::{DepthView, DepthViews};
@@ -39,6 +39,8 @@ struct Cell {
     samples: (u32, u32),
     /// Union-find parent: another cell of the segment with a smaller index, or itself.
     parent: u32,
+    /// Number of the segment, of a cell that is its own parent.
+    segment: u32,
 }
 
 /// Working memory, and the segments of the last frame, largest first.
@@ -46,17 +48,11 @@ struct Cell {
 pub(crate) struct Segments {
     samples: Vec<Sample>,
     cells: Vec<Cell>,
-    found: Vec<Segment>,
-    /// The segment of every union-find root cell.
-    of_cell: Vec<u32>,
+    /// The segments.
+    pub found: Vec<Segment>,
 }
 
 impl Segments {
-    /// The segments, largest first.
-    pub(crate) fn found(&self) -> &[Segment] {
-        &self.found
-    }
-
     /// Segments a whole frame.
     pub(crate) fn find(&mut self, views: DepthViews, config: &Config) {
         let DepthViews { frame, origin, .. } = views;
@@ -126,7 +122,7 @@ impl Segments {
             let end = start + samples.len() as u32;
             if samples.iter().map(|sample| sample.weight).sum::<f32>() >= LEAST_PATCHES {
                 let parent = self.cells.len() as u32;
-                self.cells.push(Cell { key: samples[0].key, samples: (start, end), parent });
+                self.cells.push(Cell { key: samples[0].key, samples: (start, end), parent, segment: 0 });
             }
             start = end;
         }
@@ -162,14 +158,13 @@ impl Segments {
 
     fn sum_up(&mut self) {
         self.found.clear();
-        reset(&mut self.of_cell, self.cells.len(), 0);
         for index in 0..self.cells.len() {
             let first = self.first(index as u32) as usize;
             if first == index {
-                self.of_cell[index] = self.found.len() as u32;
+                self.cells[index].segment = self.found.len() as u32;
                 self.found.push(Segment { center: Vec3::ZERO, bounds: Aabb::EMPTY, patches: 0.0 });
             }
-            let segment = &mut self.found[self.of_cell[first] as usize];
+            let segment = &mut self.found[self.cells[first].segment as usize];
             let (start, end) = self.cells[index].samples;
             for sample in &self.samples[start as usize..end as usize] {
                 let weight = f64::from(sample.weight);
@@ -221,7 +216,7 @@ mod tests {
             let frame = Frame { clouds: &clouds, ..Frame::empty(0.0) };
             let mut segments = Segments::default();
             segments.find(views(&frame, &Backgrounds::default()), &Config::default());
-            found.push(segments.found().to_vec());
+            found.push(segments.found);
             // A different order of the same points gives bitwise identical segments.
             points.reverse();
         }

@@ -10,11 +10,8 @@ pub(super) fn assign(costs: &[Vec<f64>], alone: impl Fn(usize) -> f64) -> Vec<Op
     let (rows, columns) = (costs.len(), costs.first().map_or(0, Vec::len));
     // Each row has an additional column for staying alone.
     let cost = |row: usize, column: usize| costs[row].get(column).map_or(alone(row), |cost| cost.min(IMPOSSIBLE));
-    let mut given = vec![None; rows];
-    for (row, column) in linear_sum_assignment(rows, columns + rows, &cost) {
-        given[row] = (column < columns && costs[row][column] < alone(row)).then_some(column);
-    }
-    given
+    let pairs = linear_sum_assignment(rows, columns + rows, &cost).into_iter();
+    pairs.map(|(row, column)| (column < columns && costs[row][column] < alone(row)).then_some(column)).collect()
 }
 
 #[cfg(test)]

@@ -4,10 +4,11 @@ use super::clothes::Clothes;
 use super::person::Person;
 use super::tentative_tracks::{SAME_PERSON, TentativeTrack};
 use super::{ONE_BODY, People, Refusal, assign};
-use crate::body::{Body, Model};
+use crate::body::Body;
 use crate::detect::{Detected, DetectionQuery, PlacedDetection, Surroundings, fit_body};
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::{DepthImage, Frame, PositionRelation};
+use crate::observation::observer::Own;
 use crate::observation::ownership::NO_OWNER;
 
 /// Shortest time between two detections in pixels that no person explains, seconds, while anybody is tracked.
@@ -35,7 +36,8 @@ impl People {
         self.detect_new(frame);
         let mut confirmed = self.tentative.take_confirmed(frame.stamp);
         confirmed.retain(|track| !self.is_part_of_tracked(frame, track));
-        self.refusal = self.tentative.greatest_at(frame.stamp).map(|log_odds| Refusal::Doubtful { log_odds });
+        let sums = self.tentative.updated_at(frame.stamp).map(|track| track.log_odds);
+        self.refusal = sums.max_by(f64::total_cmp).map(|log_odds| Refusal::Doubtful { log_odds });
         if !confirmed.is_empty() {
             self.associate(frame, &confirmed);
         }
@@ -55,7 +57,7 @@ impl People {
         let around = Surroundings {
             ground: frame.ground,
             excluded: frame.excluded,
-            owners: &self.assignment.owners()[track.image],
+            owners: &self.assignment.owners[track.image],
             own: Some(number as u16),
             ..Surroundings::default()
         };
@@ -76,7 +78,7 @@ impl People {
         });
         let tracked = self.persons.iter().any(Person::is_tracked);
         let wait = match tracked {
-            true if self.searches_everywhere(frame) || self.scene.shows_something_new() => DETECT_EVERY,
+            true if self.searches_everywhere(frame) || !self.scene.shows_nobody_new => DETECT_EVERY,
             true => f64::INFINITY,
             false => 0.0,
         };
@@ -91,7 +93,7 @@ impl People {
         // Of several persons who touch, those who are found first show where the others are.
         let query = match tracked {
             true if !first => DetectionQuery::New,
-            false if self.everybody => DetectionQuery::Any,
+            false if self.followed().is_none() => DetectionQuery::Any,
             _ => DetectionQuery::All,
         };
         self.detect(frame, query);
@@ -100,7 +102,8 @@ impl People {
     /// Whether somebody may be in what does not move: before every view was searched, and while somebody is lost.
     fn searches_everywhere(&self, frame: &Frame) -> bool {
         let searched = (0..frame.images.len()).all(|number| self.scene.is_old(number, frame.stamp));
-        self.everybody && (!searched || self.persons.iter().any(|person| person.present && !person.is_tracked()))
+        self.followed().is_none()
+            && (!searched || self.persons.iter().any(|person| person.present && !person.is_tracked()))
     }
 
     /// Whether a detection may be of somebody new or lost, and not of a person whose given start nothing confirmed yet.
@@ -118,7 +121,7 @@ impl People {
             for next in 0..MOST_TOGETHER {
                 let Some(one) = found.get(next) else { break };
                 let detected = Detected { detection: &one.detection, map: self.detector.map() };
-                newcomers.extend(fit_body(&Model::new(self.prototype.clone()), detected));
+                newcomers.extend(fit_body(&self.prototype, detected));
                 // Newcomers are numbered after all persons.
                 let (image, pixels) = (&frame.images[number], &one.detection.pixels);
                 self.assignment.assign_segment(image, number, pixels, self.persons.len(), &newcomers);
@@ -127,7 +130,7 @@ impl People {
                 }
             }
             for found in found {
-                let still = self.scene.is_still(frame, number, &found.detection.pixels);
+                let still = self.scene.is_still(&frame.images[number], &found.detection.pixels);
                 let odds = still.then(|| self.detector.static_odds());
                 self.tentative.update(TentativeTrack::in_image(frame.stamp, found, number), odds);
             }
@@ -137,11 +140,11 @@ impl People {
     /// Returns the persons who are detected in an image, and are to be tracked.
     fn detect_in_image(&mut self, frame: &Frame, number: usize, query: DetectionQuery) -> Vec<PlacedDetection> {
         let image = &frame.images[number];
-        let scene = self.scene.known().depth(image);
+        let scene = self.scene.known.depth(image);
         let around = Surroundings {
             ground: frame.ground,
             excluded: frame.excluded,
-            owners: self.assignment.owners().get(number).map_or(&[], Vec::as_slice),
+            owners: self.assignment.owners.get(number).map_or(&[], Vec::as_slice),
             // A person may have stood there since the camera started, so only an old background is excluded.
             background: if self.scene.is_old(number, frame.stamp) { scene } else { &[] },
             ..Surroundings::default()
@@ -159,7 +162,7 @@ impl People {
 
     /// Returns the middle of those pixels of a segment that nobody owns, world frame, if these are many.
     fn rest_of_segment(&self, image: &DepthImage, number: usize, pixels: &[usize]) -> Option<Vec3> {
-        let owners = &self.assignment.owners()[number];
+        let owners = &self.assignment.owners[number];
         let free = || pixels.iter().filter(|pixel| owners[**pixel] == NO_OWNER);
         let place = |pixel: usize| image.back_project(pixel, image.pixels.get(pixel) * image.meters_per_unit as f32);
         let (count, sum) = (free().count() as f64, free().map(|pixel| place(*pixel)).sum::<Vec3>());
@@ -269,17 +272,21 @@ impl People {
 
     /// Returns the body of a tentative track, in its sizes, and its poses.
     fn fit_track(&self, track: &TentativeTrack) -> Option<(Body, Vec<Pose>)> {
-        let model = Model::new(self.prototype.clone());
         match track.positions.as_slice() {
-            [] => fit_body(&model, self.detected(track)),
+            [] => fit_body(&self.prototype, self.detected(track)),
             positions => self.detected_body().fit(&sites_of(positions), true).ok(),
         }
     }
 
+    /// The one who is followed, `None` where everybody is wanted. Others than that one are looked for only when something moves: a
+    /// look at every piece of furniture takes as long as three frames.
+    fn followed(&self) -> Option<&Person> {
+        self.persons.first().filter(|person| person.followed)
+    }
+
     /// The body whose sites the frame's detections name: that of the one who is followed may have been edited.
     fn detected_body(&self) -> &Body {
-        let followed = self.persons.first().filter(|person| person.followed);
-        followed.map_or(&self.prototype, |person| person.tracker.body())
+        self.followed().map_or(&self.prototype, |person| person.tracker.body())
     }
 
     /// Returns the colors of a tentative track's clothes.
@@ -288,7 +295,7 @@ impl People {
         if let Some((body, poses)) = self.fit_track(track) {
             let tracked = |owner: u16| usize::from(owner) < self.persons.len();
             let free = |image: usize, pixel: usize| {
-                self.assignment.owners()[image].get(pixel).is_some_and(|owner| !tracked(*owner))
+                self.assignment.owners[image].get(pixel).is_some_and(|owner| !tracked(*owner))
             };
             clothes.observe(frame, &body, &poses, free);
         }
@@ -314,13 +321,13 @@ impl People {
 
     /// Starts a person's tracker at a tentative track, in the pixels whose owner is `own`. Returns whether the person is there.
     fn reactivate(&mut self, frame: &Frame, track: &TentativeTrack, number: usize, own: usize) -> bool {
-        self.scene.release(frame, track.image, &track.detection.pixels);
+        self.scene.known.release(frame, Own { image: track.image, pixels: &track.detection.pixels });
         let person = &mut self.persons[number];
         if !self.options.includes(person.id) {
             return false;
         }
         let known = person.created < frame.stamp;
-        let ownership = self.assignment.ownership(own, self.scene.known());
+        let ownership = self.assignment.ownership(own, &self.scene.known);
         let detected = Detected { detection: &track.detection, map: self.detector.map() };
         let placed = PlacedDetection { index: 0, root: track.place, detection: track.detection.clone() };
         let depth_frame = &Frame { colors: &[], ..*frame };

@@ -20,7 +20,8 @@ use crate::config::Config;
 use crate::detect::{BoundDetector, Detect, DetectError};
 use crate::error::TrackError;
 use crate::math::Vec3;
-use crate::observation::frame::{DetectedPerson, Frame, PositionRelation};
+use crate::observation::frame::{DetectedPerson, Frame};
+use crate::observation::observer::Own;
 use crate::threads::Threads;
 use crate::tracker::BodyTracker;
 use births::NEW;
@@ -29,6 +30,7 @@ use person::Person;
 use pixel_assignment::{PixelAssignment, PredictedBody};
 pub use refusal::Refusal;
 use scene_model::SceneModel;
+use std::borrow::Cow;
 use tentative_tracks::{SAME_PERSON, TentativeTracks};
 
 /// Two tracks whose roots are nearer than this are duplicates, meters.
@@ -66,8 +68,6 @@ pub struct People {
     detector: BoundDetector,
     last_detection: Option<f64>,
     refusal: Option<Refusal>,
-    /// Whether everybody is wanted; otherwise only the one who is followed, and others are looked for when something moves.
-    everybody: bool,
     stamp: Option<f64>,
     threads: Threads,
 }
@@ -82,12 +82,11 @@ impl People {
             persons: Vec::new(),
             next_id: 1,
             assignment: PixelAssignment::default(),
-            scene: SceneModel::new(config.background),
+            scene: SceneModel::default(),
             tentative: TentativeTracks::default(),
             detector: BoundDetector::default(),
             last_detection: None,
             refusal: None,
-            everybody: true,
             stamp: None,
             threads,
             config: Config { threads: 1, ..config },
@@ -157,7 +156,7 @@ impl People {
     /// Forgets everybody but the first person, and the scene. The next frame may have any stamp.
     fn forget_others(&mut self) {
         self.persons.truncate(1);
-        (self.scene, self.tentative) = (SceneModel::new(self.config.background), TentativeTracks::default());
+        (self.scene, self.tentative) = Default::default();
         (self.last_detection, self.stamp) = (None, None);
     }
 
@@ -167,9 +166,8 @@ impl People {
         Person::new(self.next_id, body, config, self.detector.fresh(), stamp)
     }
 
-    /// Updates all persons with the next frame. `own` has the frames of those persons who have measurements that the others lack;
-    /// a person is fitted to color pictures only if their own frame has any.
-    /// On error nothing changes.
+    /// Updates all persons with the next frame. `own` has what was measured on single persons in addition, by their numbers: points,
+    /// positions and rays, and color pictures, to which nobody else is fitted. On error nothing changes.
     pub fn step(&mut self, frame: &Frame, own: &[(usize, Frame)]) -> Result<(), TrackError> {
         frame.check(&self.prototype, self.stamp)?;
         own.iter().try_for_each(|(_, frame)| frame.check(&self.prototype, self.stamp))?;
@@ -182,18 +180,20 @@ impl People {
         self.stamp = Some(frame.stamp);
         self.refusal = None;
         self.detector.clear_error();
-        self.scene.register(frame);
+        if self.config.background {
+            self.scene.register(frame);
+        }
         self.assign_pixels(frame);
         let shown = self.match_detections(frame);
         self.follow(frame, own, &shown);
         for person in &self.persons {
             if let Some((image, pixels)) = person.tracker.moved_to().filter(|_| person.present) {
-                self.scene.release(frame, image, pixels);
+                self.scene.known.release(frame, Own { image, pixels });
             }
         }
         // A lost person must not become part of the scene, and is searched for in the pixels assigned to them as well.
         if !self.persons.iter().any(|person| person.present && !person.is_tracked()) {
-            self.scene.learn(frame, self.assignment.owners());
+            self.scene.learn(frame, &self.assignment.owners);
         }
         for number in (0..self.persons.len()).filter(|number| !self.persons[*number].is_tracked()) {
             self.assignment.release(number..=number);
@@ -212,7 +212,7 @@ impl People {
             .zip(&self.persons)
             .filter(|(_, person)| person.present)
             .map(|(number, person)| PredictedBody { number, body: person.tracker.body(), poses: &person.expected });
-        self.assignment.assign(frame, self.scene.known(), predicted);
+        self.assignment.assign(frame, &self.scene.known, predicted);
     }
 
     /// Returns the index of the tracked person whom each of the frame's detections shows, if it shows one.
@@ -235,20 +235,21 @@ impl People {
 
     /// Steps every tracker with its own pixels and points, and with the detections that show the person.
     fn follow(&mut self, frame: &Frame, own: &[(usize, Frame)], shown: &[Option<usize>]) {
-        let (assignment, scene) = (&self.assignment, self.scene.known());
-        // With several persons, color pictures only serve to identify them.
-        let shared = &Frame { colors: &[], ..*frame };
+        let (assignment, scene) = (&self.assignment, &self.scene.known);
+        let nothing = Frame::empty(frame.stamp);
         let work = |(number, person): (usize, &mut Person)| {
             if person.present {
                 let ownership = assignment.ownership(number, scene);
-                let mut of = *own.iter().find(|(id, _)| *id == person.id).map_or(shared, |(_, frame)| frame);
+                let own = own.iter().find(|(id, _)| *id == person.id).map_or(&nothing, |(_, own)| own);
+                let count = person.tracker.body().sites().len();
                 let detection = shown.iter().position(|shown| *shown == Some(number));
-                let positions = detection.map(|detection| {
-                    let count = person.tracker.body().sites().len();
-                    let known = frame.detections[detection].positions.iter().filter(|of| of.site < count);
-                    of.positions.iter().chain(known).copied().collect::<Vec<PositionRelation>>()
-                });
-                of.positions = positions.as_deref().unwrap_or(of.positions);
+                let detected = detection.map_or(&[][..], |detection| frame.detections[detection].positions);
+                let detected: Vec<_> = detected.iter().filter(|of| of.site < count).copied().collect();
+                let positions = joined(frame.positions, own.positions);
+                let (clouds, positions) = (joined(frame.clouds, own.clouds), joined(&positions, &detected));
+                let rays = joined(frame.rays, own.rays);
+                // With several persons, the frame's color pictures only serve to identify them.
+                let of = Frame { clouds: &clouds, positions: &positions, rays: &rays, colors: own.colors, ..*frame };
                 person.tracker.step(&of, ownership);
                 person.update(frame, ownership);
             }
@@ -278,5 +279,14 @@ impl People {
     fn delete_expired(&mut self, stamp: f64) {
         let forget_after = self.options.forget_after;
         self.persons.retain(|person| person.present || person.followed || stamp - person.last_tracked < forget_after);
+    }
+}
+
+/// Both lists as one; copied only where neither is empty.
+fn joined<'a, T: Copy>(first: &'a [T], second: &'a [T]) -> Cow<'a, [T]> {
+    match (first, second) {
+        (_, []) => first.into(),
+        ([], _) => second.into(),
+        _ => [first, second].concat().into(),
     }
 }

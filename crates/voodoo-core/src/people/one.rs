@@ -52,8 +52,6 @@ impl Tracker {
         (person.followed, person.last_tracked) = (true, f64::NEG_INFINITY);
         people.persons.push(person);
         people.next_id += 1;
-        // Others matter when they move, and a look at every piece of furniture takes as long as three frames.
-        people.everybody = false;
         Ok(Self { people })
     }
 
@@ -105,9 +103,9 @@ impl Tracker {
         let id = self.followed().id;
         // What was measured on the one who is followed says nothing about others.
         let free = frame.clouds.iter().all(|cloud| cloud.scope == Scope::Free);
-        let clouds = if free { frame.clouds } else { &[] };
+        let (clouds, own) = if free { (frame.clouds, &[][..]) } else { (&[][..], frame.clouds) };
         let shared = Frame { clouds, colors: &[], positions: &[], rays: &[], ..*frame };
-        self.people.advance(&shared, &[(id, *frame)]);
+        self.people.advance(&shared, &[(id, Frame { clouds: own, ..*frame })]);
         let person = self.followed();
         if !person.present {
             person.tracker.stop(frame.stamp);

@@ -161,6 +161,6 @@ impl Person {
 
 /// Returns the natural logarithm of a detected person's stature, and its variance. All sizes scale with the stature.
 fn stature(detected: Detected) -> Option<[f64; 2]> {
-    let [length, sigma] = detected.length(detected.map.stature()?)?;
+    let [length, sigma] = detected.detection.lengths.get(detected.map.stature?)?;
     Some([length.ln(), sigma * sigma])
 }

@@ -31,7 +31,8 @@ pub(super) struct PredictedBody<'a> {
 pub(super) struct PixelAssignment {
     /// Numbers of the bodies that pixels and points were assigned to.
     assigned: Vec<u16>,
-    owners: Vec<Vec<u16>>,
+    /// The owner of each pixel, image after image.
+    pub(super) owners: Vec<Vec<u16>>,
     cloud_owners: Vec<Vec<u16>>,
     distances: Vec<f32>,
     /// Depths of a row, meters.
@@ -44,11 +45,6 @@ pub(super) struct PixelAssignment {
 }
 
 impl PixelAssignment {
-    /// Returns the owner of each pixel, image after image.
-    pub(super) fn owners(&self) -> &[Vec<u16>] {
-        &self.owners
-    }
-
     /// Returns the ownership mask of a person for this frame.
     pub(super) fn ownership<'a>(&'a self, number: usize, scene: &'a Backgrounds) -> OwnershipMask<'a> {
         let own = number as u16;
@@ -108,6 +104,8 @@ impl PixelAssignment {
         reset(owners, count, NO_OWNER);
         for predicted in bodies.filter(|_| count > 0) {
             if let Some(origin) = predicted.poses.first().map(|root| root.translation) {
+                self.queries.clear();
+                self.pixels.clear();
                 gather(self, origin, &body_box(predicted.body, predicted.poses, f64::from(REACH)));
                 self.assign_nearest(predicted, origin, owners);
             }
@@ -164,8 +162,6 @@ impl PixelAssignment {
 
     /// Gathers the points of a cloud within a box of the world, relative to `origin`.
     fn gather_cloud(&mut self, cloud: &Cloud, origin: Vec3, bounds: &Aabb) {
-        self.queries.clear();
-        self.pixels.clear();
         for index in 0..cloud.points.len() {
             let point = cloud.world_from_sensor * cloud.points.get(index);
             if bounds.contains(point) {
@@ -182,8 +178,6 @@ impl PixelAssignment {
         let together = (image.camera.width() / COLUMNS).max(1);
         let scale = image.meters_per_unit as f32;
         let Self { queries, pixels, depth, .. } = self;
-        queries.clear();
-        pixels.clear();
         depth.clear();
         depth.reserve(image.camera.width());
         for row in rows {

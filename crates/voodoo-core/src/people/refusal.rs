@@ -10,30 +10,16 @@ use crate::relocalize::ENOUGH_ODDS;
 /// let words = Refusal::Doubtful { log_odds: 1.5 }.to_string();
 /// assert!(words.starts_with("log odds of 1.5"));
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refusal {
     /// The detections so far are not certain enough.
+    #[error("log odds of {log_odds:.1} that it is a person, expected {ENOUGH_ODDS:.1} before it is tracked")]
     Doubtful {
         /// Sum of their log odds.
         log_odds: f64,
     },
     /// At the detected joints hardly any limb would be measured.
+    #[error("a body at the detected joints, of which hardly any limb would be measured")]
     Unsupported,
-}
-
-impl std::fmt::Display for Refusal {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Doubtful { log_odds } => {
-                write!(
-                    f,
-                    "log odds of {log_odds:.1} that it is a person, expected {ENOUGH_ODDS:.1} before it is tracked"
-                )
-            }
-            Self::Unsupported => {
-                f.write_str("a body at the detected joints, of which hardly any limb would be measured")
-            }
-        }
-    }
 }

@@ -1,8 +1,7 @@
 //! Model of the static scene shared by all persons, learned in pixels that no person owns.
 
 use crate::observation::background::{Background, Backgrounds};
-use crate::observation::frame::Frame;
-use crate::observation::observer::Own;
+use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::ownership::NO_OWNER;
 
 /// One row in this many is learned per frame, for speed; the scene is static.
@@ -27,14 +26,12 @@ const SAME: f32 = 0.05;
 /// The learned depth of the scene, and pending depths that may become part of it.
 #[derive(Debug, Default)]
 pub(super) struct SceneModel {
-    known: Backgrounds,
+    /// The learned scene.
+    pub(super) known: Backgrounds,
     images: Vec<PendingDepth>,
     row: usize,
-    /// Number of pixels in the rows that were learned last, and of those that show neither a person nor the known scene.
-    learned: usize,
-    unexplained: usize,
-    /// Whether nothing is learned.
-    off: bool,
+    /// Whether the last frame that was learned showed nobody new: nothing but persons and the known scene.
+    pub(super) shows_nobody_new: bool,
 }
 
 /// Recent depth of each pixel where the scene is not known, or of the person there, and the number of consecutive observations.
@@ -49,21 +46,8 @@ struct PendingDepth {
 }
 
 impl SceneModel {
-    /// Returns a scene of which nothing is known yet; with `learns` false, nothing ever is.
-    pub(super) fn new(learns: bool) -> Self {
-        Self { off: !learns, ..Self::default() }
-    }
-
-    /// Returns the learned scene.
-    pub(super) fn known(&self) -> &Backgrounds {
-        &self.known
-    }
-
-    /// Registers the images of a frame. For a new camera, or one that moved far, the scene is unknown.
+    /// Registers the images of a frame: of others nothing is learned. For a new camera, or one that moved far, the scene is unknown.
     pub(super) fn register(&mut self, frame: &Frame) {
-        if self.off {
-            return;
-        }
         self.images.resize_with(frame.images.len(), PendingDepth::default);
         for (image, tentative) in frame.images.iter().zip(&mut self.images) {
             tentative.depth.resize(image.pixels.len(), 0.0);
@@ -77,11 +61,6 @@ impl SceneModel {
         });
     }
 
-    /// Whether the last frame that was learned may show somebody new: something that is neither a person nor the known scene.
-    pub(super) fn shows_something_new(&self) -> bool {
-        self.unexplained as f64 >= NEW_SHARE * self.learned as f64
-    }
-
     /// Whether the camera of an image has been at its position for long enough that its view was searched for persons.
     pub(super) fn is_old(&self, image: usize, stamp: f64) -> bool {
         self.images.get(image).and_then(|image| image.since).is_some_and(|since| stamp - since > OLD)
@@ -90,7 +69,8 @@ impl SceneModel {
     /// Learns some rows in pixels that no person owns; the whole image in the second frame of a camera at its position.
     pub(super) fn learn(&mut self, frame: &Frame, owners: &[Vec<u16>]) {
         self.row = (self.row + 1) % LEARNED_ROWS;
-        (self.learned, self.unexplained) = (0, 0);
+        // Pixels that were learned, and those of them that show neither a person nor the known scene.
+        let (mut learned, mut unexplained) = (0, 0);
         for ((image, tentative), owners) in frame.images.iter().zip(&mut self.images).zip(owners) {
             let Some(known) = self.known.depth_mut(image) else { continue };
             if tentative.since.is_none() {
@@ -106,7 +86,7 @@ impl SceneModel {
                 }
             }
             for row in (self.row..image.camera.height()).step_by(LEARNED_ROWS) {
-                self.learned += image.camera.width();
+                learned += image.camera.width();
                 let (mut new, mut width) = (0, 0.0);
                 for index in row * image.camera.width()..(row + 1) * image.camera.width() {
                     let seen = image.depth(index).filter(|_| owners[index] == NO_OWNER);
@@ -115,30 +95,24 @@ impl SceneModel {
                         None => (new, width) = (0, 0.0),
                     }
                     if width >= NEW_WIDTH {
-                        self.unexplained += std::mem::take(&mut new);
+                        unexplained += std::mem::take(&mut new);
                     }
                     let Some(z) = seen else { continue };
                     learn_pixel(&mut known[index], &mut tentative.depth[index], &mut tentative.frames[index], z);
                 }
             }
         }
+        self.shows_nobody_new = (unexplained as f64) < NEW_SHARE * learned as f64;
     }
 
     /// Whether most of these pixels of an image show the learned scene.
-    pub(super) fn is_still(&self, frame: &Frame, image: usize, pixels: &[usize]) -> bool {
-        let Some(image) = frame.images.get(image) else { return false };
+    pub(super) fn is_still(&self, image: &DepthImage, pixels: &[usize]) -> bool {
         let known = self.known.depth(image);
         let still = |pixel: &&usize| {
             let known = known.get(**pixel).copied().unwrap_or(0.0);
             image.depth(**pixel).is_some_and(|z| Background::contains(known, z))
         };
         2 * pixels.iter().filter(still).count() > pixels.len()
-    }
-
-    /// Releases pixels of an image that show a person: where they agree with the learned depth, that depth is deleted. Learned
-    /// depth behind the person is kept; without it, the background would look like a flat body once the person is gone.
-    pub(super) fn release(&mut self, frame: &Frame, image: usize, pixels: &[usize]) {
-        self.known.release(frame, Own { image, pixels });
     }
 }
 
@@ -165,6 +139,7 @@ fn learn_pixel(known: &mut f32, tentative: &mut f32, frames: &mut u8, z: f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::observation::observer::Own;
     use crate::testing::with_frame;
 
     const PIXELS: usize = 160 * 124;
@@ -193,7 +168,7 @@ mod tests {
         (0..3).for_each(|frame| feed(&mut scene, 4000, frame, |_, _| ()));
         let mut new = |millimeters: u16, owner: u16| {
             feed_owned(&mut scene, millimeters, owner, 3, |_, _| ());
-            scene.shows_something_new()
+            !scene.shows_nobody_new
         };
         assert!(!new(3900, NO_OWNER) && !new(2000, 0) && new(2000, NO_OWNER));
     }
@@ -204,7 +179,7 @@ mod tests {
             let mut scene = SceneModel::default();
             (0..3).for_each(|frame| feed_owned(&mut scene, covered, owner, frame, |_, _| ()));
             feed(&mut scene, 4000, 3, |_, _| ());
-            assert_eq!(scene.shows_something_new(), owner == NO_OWNER);
+            assert_eq!(scene.shows_nobody_new, owner != NO_OWNER);
         }
     }
 
@@ -214,8 +189,8 @@ mod tests {
             let mut scene = SceneModel::default();
             (0..3).for_each(|frame| feed(&mut scene, 5000, frame, |_, _| ()));
             feed(&mut scene, came, 3, |scene, frame| {
-                scene.release(frame, 0, &[7]);
-                assert_eq!(scene.known().depth(&frame.images[0])[7..9], [left, 5.0]);
+                scene.known.release(frame, Own { image: 0, pixels: &[7] });
+                assert_eq!(scene.known.depth(&frame.images[0])[7..9], [left, 5.0]);
             });
         }
     }

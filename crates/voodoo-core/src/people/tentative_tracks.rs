@@ -93,11 +93,6 @@ impl TentativeTracks {
         self.tracks.iter().filter(move |track| track.stamp == stamp)
     }
 
-    /// Returns the greatest sum of log odds of those that were detected in the frame with this stamp.
-    pub(super) fn greatest_at(&self, stamp: f64) -> Option<f64> {
-        self.updated_at(stamp).map(|track| track.log_odds).max_by(f64::total_cmp)
-    }
-
     /// Deletes the tracks that coincide with one of `others`.
     pub(super) fn discard(&mut self, others: &[TentativeTrack]) {
         let same = |a: &TentativeTrack, b: &TentativeTrack| a.place.distance(b.place) < SAME_PERSON;

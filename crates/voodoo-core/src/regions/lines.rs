@@ -90,10 +90,10 @@ impl Viewer<'_> {
         for height in 0..a_side {
             let t = (height as f64 + 0.5) / a_side as f64;
             let Some(points) = limb.shape.contour(t, camera) else { continue };
-            let sides = points.map(|found| {
-                let normal = camera_from_limb.rotation * found.normal;
+            let sides = points.map(|[point, normal]| {
+                let normal = camera_from_limb.rotation * normal;
                 let [fx, fy] = self.camera.focal();
-                self.line(index, camera_from_limb, found.point, [normal.x / fx, normal.y / fy])
+                self.line(index, camera_from_limb, point, [normal.x / fx, normal.y / fy])
             });
             let [Some(mut first), Some(mut second)] = sides else { continue };
             let apart = [second.place[0] - first.place[0], second.place[1] - first.place[1]];

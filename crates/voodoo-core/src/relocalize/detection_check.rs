@@ -64,7 +64,7 @@ pub(crate) enum DetectionVerdict {
 pub(crate) fn trunk_is_elsewhere(detected: Detected, body: &Body, poses: &[Pose], origin: Vec3) -> bool {
     // The mean distance of detected joints from the tracked ones, and the mean of their standard deviations, meters.
     let (mut apart, mut spread, mut count) = (0.0, 0.0, 0.0_f64);
-    for joint in detected.map.trunk() {
+    for joint in &detected.map.trunk {
         if let (Some(detected), Some(site)) = (detected.joint(*joint), detected.map.site(*joint)) {
             let tracked: Vec3 = body.site_position(poses, site) + origin;
             apart += detected.position.distance(tracked);

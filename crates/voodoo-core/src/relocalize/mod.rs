@@ -69,7 +69,7 @@ impl Relocalizer {
         let detected = self.detected()?;
         match set.filter(|set| is_sized_like(set, detected, SIGMAS)) {
             Some(set) => Some((set.clone(), fit_pose(set, detected)?)),
-            None => fit_body(model, detected),
+            None => fit_body(&model.reference_body, detected),
         }
     }
 
@@ -146,8 +146,8 @@ impl Relocalizer {
         }
         self.search.segments.find(views, context.config);
         fit.swap_matches(&mut self.matched);
-        let found = (0..self.search.segments.found().len()).any(|index| {
-            let segment = self.search.segments.found()[index];
+        let found = (0..self.search.segments.found.len()).any(|index| {
+            let segment = self.search.segments.found[index];
             self.search.is_body_sized(&context.model.body, segment) && {
                 let bounds = segment.bounds.enlarged(context.config.body_box_margin);
                 self.candidates.gather(views, &bounds, context.config);

@@ -70,7 +70,8 @@ impl Trials {
     fn measure_distances(&mut self, context: Context, poses: &[Pose]) {
         let Self { sample, nearest, distances, .. } = self;
         let candidates = context.observation.candidates;
-        sample.assign(&candidates.points, &candidates.weight);
+        sample.clear();
+        sample.extend(&candidates.points, &candidates.weight);
         sample.subsample(ROUGH_SAMPLE);
         reset(nearest, sample.len(), f32::INFINITY);
         for limb in 0..poses.len() {

@@ -38,16 +38,6 @@ pub struct SurfaceBatch {
 }
 
 impl SurfaceBatch {
-    /// Number of results.
-    pub fn len(&self) -> usize {
-        self.region.len()
-    }
-
-    /// True when there is no result.
-    pub fn is_empty(&self) -> bool {
-        self.region.is_empty()
-    }
-
     /// Reserves memory for `len` results in total.
     pub fn reserve(&mut self, len: usize) {
         self.points.reserve(len);

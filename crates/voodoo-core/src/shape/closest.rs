@@ -98,11 +98,6 @@ impl TaperedEllipticCylinder {
         SurfacePoint { point, normal, signed_distance, region }
     }
 
-    /// Exact distance from `q` to the closed surface, limb frame, meters, negative inside.
-    pub fn signed_distance(&self, q: Vec3) -> f64 {
-        self.closest_point(q).signed_distance
-    }
-
     /// `|a0 b1 - a1 b0| / (a0 b1 + a1 b0)`: 0 when the two end ellipses have one aspect (the solid is convex), 1 at most.
     pub(super) fn aspect_change(&self) -> f64 {
         let (first, second) = (self.a0 * self.b1, self.a1 * self.b0);

@@ -14,19 +14,11 @@ const ALONG: f64 = 0.98;
 /// Tapers that differ by less than this count as equal.
 const ALIKE: f64 = 1e-9;
 
-/// A point of the contour, limb frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct ContourPoint {
-    /// The point, meters.
-    pub point: Vec3,
-    /// Outward normal of the surface there, of any length above zero: the ray from the camera lies in the tangent plane.
-    pub normal: Vec3,
-}
-
 impl TaperedEllipticCylinder {
-    /// The two points of the contour at the fraction `t` of the length, observed from `camera` (limb frame, meters). `None` if
+    /// The two points of the contour at the fraction `t` of the length, observed from `camera` (limb frame, meters), each with the
+    /// outward normal of the surface there, of any length above zero: the ray from the camera lies in the tangent plane. `None` if
     /// the camera looks along the limb or is inside it. The first point is on the side of smaller angles about the axis.
-    pub(crate) fn contour(&self, t: f64, camera: Vec3) -> Option<[ContourPoint; 2]> {
+    pub(crate) fn contour(&self, t: f64, camera: Vec3) -> Option<[[Vec3; 2]; 2]> {
         let (da, db) = (self.a1 - self.a0, self.b1 - self.b0);
         let (a, b) = (self.a0 + t * da, self.b0 + t * db);
         if a.min(b) < super::MIN_SIZE {
@@ -53,7 +45,7 @@ impl TaperedEllipticCylinder {
                 (c, s) = ((c - step * s) / norm, (s + step * c) / norm);
             }
             let normal = Vec3::new(b * self.length * c, a * self.length * s, -(a * db * s * s + b * da * c * c));
-            ContourPoint { point: Vec3::new(a * c, b * s, t * self.length), normal }
+            [Vec3::new(a * c, b * s, t * self.length), normal]
         }))
     }
 
@@ -114,14 +106,14 @@ mod tests {
     /// inside hits it. At mid-height the end caps do not interfere.
     fn check(shape: &TaperedEllipticCylinder, t: f64, camera: Vec3) -> Result<(), TestCaseError> {
         let Some(points) = shape.contour(t, camera) else { return Ok(()) };
-        for found in points {
-            let normal = found.normal.normalize();
-            let away = (found.point - camera).length();
-            let aslant = (found.point - camera).dot(normal).abs() / away;
+        for [point, normal] in points {
+            let normal = normal.normalize();
+            let away = (point - camera).length();
+            let aslant = (point - camera).dot(normal).abs() / away;
             let Some(most) = newton_leaves(shape, t, camera, away) else { continue };
             prop_assert!(aslant <= most, "the ray meets the surface at {aslant}, more than {most}");
             let passes = |off: f64| {
-                let towards = (found.point + off * normal - camera).normalize();
+                let towards = (point + off * normal - camera).normalize();
                 shape.cast_ray(camera, towards).is_none()
             };
             // On a cone observed obliquely the ray may still touch nearer the thick end: a saddle is no wider than this.
@@ -146,11 +138,11 @@ mod tests {
         #[test]
         fn the_points_lie_on_the_surface_to_both_sides((shape, camera) in limb_and_camera(), t in 0.0..1.0) {
             let Some([first, second]) = shape.contour(t, camera) else { return Ok(()) };
-            for found in [first, second] {
-                prop_assert!(shape.closest_point(found.point).signed_distance.abs() < 1e-9);
+            for [point, _] in [first, second] {
+                prop_assert!(shape.closest_point(point).signed_distance.abs() < 1e-9);
             }
             let across = |point: Vec3| camera.x * point.y - camera.y * point.x;
-            prop_assert!(across(first.point) < 0.0 && across(second.point) > 0.0);
+            prop_assert!(across(first[0]) < 0.0 && across(second[0]) > 0.0);
         }
     }
 

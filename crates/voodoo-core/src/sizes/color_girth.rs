@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix3;
 
-use super::girth::{GIRTH_STEPS, Girth, GirthPrior, GirthSystem, TIP_FACTORS, kernel};
+use super::girth::{GIRTH_STEPS, Girth, GirthSystem, TIP_FACTORS, follow_girth, kernel, start_girth};
 use crate::association::correspondence::RegionPair;
 use crate::body::{Body, Model};
 use crate::fit::{Fit, Setting};
@@ -59,11 +59,6 @@ pub(super) struct ColorGirths {
 }
 
 impl ColorGirths {
-    /// Forgets everything.
-    pub(super) fn clear(&mut self) {
-        self.limbs.clear();
-    }
-
     /// Fits the limbs' surfaces to color edges where colors compare poses.
     pub(super) fn start(&mut self, setting: Setting, model: &mut Model, poses: &mut [Pose], fit: &mut Fit) {
         if !setting.with_model(model).compares_colors() {
@@ -81,14 +76,8 @@ impl ColorGirths {
                     model.body.change_tip(limb, longer.clamp(TIP_FACTORS[0], TIP_FACTORS[1]));
                 }
                 let system = system(&model.body.limbs()[limb].shape, edges());
-                let Some(prior) = GirthPrior::of(&model.body, limb, &self.limbs) else { continue };
-                if system.is_empty() {
-                    continue;
-                }
-                let Some(step) = self.limbs[limb].start(&system, &prior, 1.0) else { continue };
-                if model.body.change_girth(limb, step.shift, step.axes()) {
-                    let pose = &mut poses[limb];
-                    pose.translation += pose.rotation * step.shift;
+                if !system.is_empty() {
+                    start_girth(&mut self.limbs, limb, &system, 1.0, &mut model.body, &mut poses[limb]);
                 }
             }
         }
@@ -104,11 +93,8 @@ impl ColorGirths {
         for limb in 0..self.limbs.len() {
             let edges = edges_of(&fit.correspondences.regions, limb, poses[limb]);
             let system = system(&model.body.limbs()[limb].shape, edges);
-            let Some(prior) = GirthPrior::of(&model.body, limb, &self.limbs) else { continue };
-            let frames = f64::from(GIRTHS_EVERY);
-            if let Some(axes) = self.limbs[limb].follow(&system, AXIS_SIGMA, frames, Matrix3::zeros(), &prior) {
-                model.body.change_girth(limb, Vec3::ZERO, axes);
-            }
+            let errors = (AXIS_SIGMA, f64::from(GIRTHS_EVERY));
+            follow_girth(&mut self.limbs, limb, &system, errors, Matrix3::zeros(), &mut model.body);
         }
     }
 }

@@ -96,10 +96,10 @@ impl GirthSystem {
         self.g += weight * distance * row;
     }
 
-    /// Multiplies the information by a factor.
-    fn scale(&mut self, factor: f64) {
-        self.h *= factor;
-        self.g *= factor;
+    /// Adds an edge of the depth contour.
+    fn add_edge(&mut self, shape: &TaperedEllipticCylinder, edge: &DepthEdge) {
+        let wider = edge.reach - edge.rim;
+        self.add(shape, edge.foot, edge.side, wider, edge.weight * kernel(wider) / (EDGE_SIGMA * EDGE_SIGMA));
     }
 
     /// Whether nothing was added.
@@ -156,6 +156,37 @@ pub(crate) struct Girth {
     total: GirthFit,
 }
 
+/// Takes over what the first frame measured of one of `girths`, see [`Girth::start`], into the body, and moves the limb's pose along.
+pub(super) fn start_girth(
+    girths: &mut [Girth],
+    limb: usize,
+    system: &GirthSystem,
+    share: f64,
+    body: &mut Body,
+    pose: &mut Pose,
+) {
+    let Some(prior) = GirthPrior::of(body, limb, girths) else { return };
+    let Some(step) = girths[limb].start(system, &prior, share) else { return };
+    if body.change_girth(limb, step.shift, step.axes()) {
+        pose.translation += pose.rotation * step.shift;
+    }
+}
+
+/// Adds what a later frame measured of one of `girths`, see [`Girth::follow`], to the body.
+pub(super) fn follow_girth(
+    girths: &mut [Girth],
+    limb: usize,
+    system: &GirthSystem,
+    (axis_sigma, frames): (f64, f64),
+    kept: Matrix3<f64>,
+    body: &mut Body,
+) {
+    let Some(prior) = GirthPrior::of(body, limb, girths) else { return };
+    if let Some(axes) = girths[limb].follow(system, axis_sigma, frames, kept, &prior) {
+        body.change_girth(limb, Vec3::ZERO, axes);
+    }
+}
+
 /// Normal equations of a limb of known pose in the first frame, from its matches and edges; `None` with too few points. Weights are
 /// robust (Cauchy).
 pub(super) fn first_system(
@@ -175,11 +206,9 @@ pub(super) fn first_system(
         let n = working_from_limb.inverse_transform_vector(matches.surface.normals.get(index));
         system.add(shape, foot, n, distance, kernel(distance));
     }
-    system.scale((INDEPENDENT / points as f64).min(1.0) / (POINT_SIGMA * POINT_SIGMA));
-    for edge in edges {
-        let distance = edge.reach - edge.rim;
-        system.add(shape, edge.foot, edge.side, distance, edge.weight * kernel(distance) / (EDGE_SIGMA * EDGE_SIGMA));
-    }
+    let information = (INDEPENDENT / points as f64).min(1.0) / (POINT_SIGMA * POINT_SIGMA);
+    system = GirthSystem { h: system.h * information, g: system.g * information };
+    edges.iter().for_each(|edge| system.add_edge(shape, edge));
     Some(system)
 }
 
@@ -191,8 +220,7 @@ pub(super) fn side_system(
 ) -> (GirthSystem, Matrix3<f64>) {
     let (mut system, mut thickness) = (GirthSystem::default(), Vector3::zeros());
     for edge in edges {
-        let wider = edge.reach - edge.rim;
-        system.add(shape, edge.foot, edge.side, wider, edge.weight * kernel(wider) / (EDGE_SIGMA * EDGE_SIGMA));
+        system.add_edge(shape, &edge);
         let ahead = Vec3::new(-edge.side.y, edge.side.x, 0.0);
         let Section { a, b, .. } = shape.section(edge.foot.z / shape.length());
         let depth = (a * ahead.x).hypot(b * ahead.y);
@@ -266,15 +294,20 @@ impl Girth {
         Some(factor.solve(&(self.measured + prior.information * prior.mean)))
     }
 
-    /// Applies a shift and logarithms of factors. Returns the part of them that was applied.
+    /// Applies a shift and logarithms of factors, limited to plausible variation between persons. Returns the part of them that was
+    /// applied.
     fn change(&mut self, shift: Vector2<f64>, girths: Vector3<f64>) -> Option<GirthFit> {
         if !shift.iter().chain(girths.iter()).all(|value| value.is_finite()) {
             return None;
         }
-        let factors = [0, 1, 2].map(|index: usize| girths[index].exp());
-        let (total, done) = self.total.followed_by(&GirthFit { shift: Vec3::new(shift.x, shift.y, 0.0), factors });
-        self.total = total;
-        Some(done)
+        let mut step = GirthFit { shift: Vec3::new(shift.x, shift.y, 0.0), factors: girths.map(f64::exp).into() };
+        self.total.shift += step.shift;
+        for (total, factor) in self.total.factors.iter_mut().zip(&mut step.factors) {
+            let before = *total;
+            *total = (before * *factor).clamp(0.6, 1.6);
+            *factor = *total / before;
+        }
+        Some(step)
     }
 }
 
@@ -283,18 +316,6 @@ impl GirthFit {
     pub(crate) fn axes(&self) -> [f64; 4] {
         let [a, b, distal] = self.factors;
         [a, b, a * distal, b * distal]
-    }
-
-    /// Returns this change followed by another, limited to plausible variation between persons, and the part of the other change
-    /// that was applied.
-    pub(crate) fn followed_by(&self, step: &Self) -> (Self, Self) {
-        let mut total = Self { shift: self.shift + step.shift, factors: self.factors };
-        let mut done = *step;
-        for index in 0..3 {
-            total.factors[index] = (self.factors[index] * step.factors[index]).clamp(0.6, 1.6);
-            done.factors[index] = total.factors[index] / self.factors[index];
-        }
-        (total, done)
     }
 }
 

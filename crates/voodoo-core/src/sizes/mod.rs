@@ -9,10 +9,13 @@ use crate::body::{Body, Model, Pair};
 use crate::config::Config;
 use crate::detect::{Detected, JointMap};
 use crate::fit::{CONTOUR_FROM, Fit, Setting};
-use crate::math::{Pose, Vec3, reset};
+use crate::math::{Pose, Vec3};
 use crate::solver::{Gate, LENGTH_INFORMATION};
 use color_girth::ColorGirths;
-use girth::{ASIDE_SIGMA, FOUND_SHARE, GIRTH_STEPS, Girth, GirthPrior, TIP_FACTORS, first_system, side_system};
+use girth::{
+    ASIDE_SIGMA, FOUND_SHARE, GIRTH_STEPS, Girth, GirthPrior, TIP_FACTORS, first_system, follow_girth, side_system,
+    start_girth,
+};
 use reported::ReportedLengths;
 
 /// Points farther than this from the given pose are not used for the sizes, meters.
@@ -58,15 +61,15 @@ pub(crate) struct Sizes {
 impl Sizes {
     /// Restarts after a pose was set. Unless the sizes are known, the next frame fits them and later frames refine the lengths.
     pub(crate) fn restart(&mut self, model: &Model, start: Start, config: &Config) {
-        let fit = start != Start::SizesKnown;
-        (self.open, self.rough) = (fit, start == Start::Detected);
-        self.set = fit.then(|| model.body.clone());
-        let estimated = if fit && config.fit_girths { model.body.limbs().len() } else { 0 };
-        reset(&mut self.girths, estimated, Girth::default());
-        self.color_girths.clear();
-        self.pairs.clear();
-        self.reported.clear();
-        if fit && config.fit_lengths {
+        *self = Self::default();
+        if start == Start::SizesKnown {
+            return;
+        }
+        (self.open, self.rough, self.set) = (true, start == Start::Detected, Some(model.body.clone()));
+        if config.fit_girths {
+            self.girths = vec![Girth::default(); model.body.limbs().len()];
+        }
+        if config.fit_lengths {
             self.follow_lengths(model);
         }
     }
@@ -80,8 +83,8 @@ impl Sizes {
     }
 
     /// Whether the detector reported sizes of an auto-initialized body that are still uncertain.
-    pub(crate) fn is_uncertain(&self) -> bool {
-        self.reported.is_uncertain()
+    pub(crate) fn is_uncertain(&self, map: &JointMap) -> bool {
+        self.reported.is_uncertain(map)
     }
 
     /// Whether the sizes have yet to be fitted and the pose has to be fitted first.
@@ -123,12 +126,11 @@ impl Sizes {
     }
 
     /// Takes over limbs that the user changed: their girths count as given, and the lengths are refined from the new ones.
-    pub(crate) fn edited(&mut self, model: &Model, map: &JointMap) {
-        self.reported.bind(map);
+    pub(crate) fn edited(&mut self, model: &Model) {
         if !self.open {
             self.girths.clear();
         }
-        self.color_girths.clear();
+        self.color_girths = ColorGirths::default();
         self.set = self.set.is_some().then(|| model.body.clone());
         if !self.pairs.is_empty() {
             self.follow_lengths(model);
@@ -175,14 +177,8 @@ impl Sizes {
                     model.body.change_tip(limb, longer.clamp(TIP_FACTORS[0], TIP_FACTORS[1]));
                 }
                 let matches = &fit.correspondences.limbs[limb];
-                let Some(prior) = GirthPrior::of(&model.body, limb, &self.girths) else { continue };
-                let system = first_system(&shape, matches, &poses[limb], &edges_found);
-                let Some(step) = system.and_then(|system| self.girths[limb].start(&system, &prior, share)) else {
-                    continue;
-                };
-                if model.body.change_girth(limb, step.shift, step.axes()) {
-                    let pose = &mut poses[limb];
-                    pose.translation += pose.rotation * step.shift;
+                if let Some(system) = first_system(&shape, matches, &poses[limb], &edges_found) {
+                    start_girth(&mut self.girths, limb, &system, share, &mut model.body, &mut poses[limb]);
                 }
             }
         }
@@ -192,46 +188,30 @@ impl Sizes {
         self.set_radius_sigmas(&model.body, fit);
     }
 
-    /// Updates the sizes with a frame in which the body was fitted at `poses`: lengths unless the body is `lost`, and girths, if
-    /// requested, of limbs that the predicate `limb` accepts. The joints stay closed after a change of lengths.
-    pub(crate) fn refine(
+    /// Finds the depth contour of a frame in which the body was fitted at `poses`, from which sizes are estimated, and refines the
+    /// lengths unless the body is `lost`, with a prior from the reported lengths: those of a seated start are rough. The joints
+    /// stay closed.
+    pub(crate) fn refine_lengths(
         &mut self,
         setting: Setting,
         model: &mut Model,
         poses: &mut [Pose],
         predicted: &[Pose],
         fit: &mut Fit,
-        reliance: Reliance<impl Fn(usize) -> bool>,
+        map: &JointMap,
+        lost: bool,
     ) {
         if !(self.pairs.is_empty() && self.girths.is_empty()) && setting.config.max_steps >= CONTOUR_FROM {
-            // Sizes are estimated from the depth contour.
             fit.match_contour(setting.with_model(model), poses);
         }
-        if !self.pairs.is_empty() && !reliance.lost {
-            self.refine_lengths(setting, model, poses, predicted, fit);
+        if self.pairs.is_empty() || lost {
+            return;
         }
-        if reliance.girths {
-            self.color_girths.follow(setting, model, poses, fit);
-        }
-        if reliance.girths {
-            self.refine_girths(model, fit, reliance.limb);
-        }
-    }
-
-    /// Refines the lengths, with a prior from the reported lengths: those of a seated start are rough.
-    fn refine_lengths(
-        &mut self,
-        setting: Setting,
-        model: &mut Model,
-        poses: &mut [Pose],
-        predicted: &[Pose],
-        fit: &mut Fit,
-    ) {
         let Self { pairs, stretched, change, pull, reported, .. } = self;
         change.clear();
         pull.clear();
         for (pair, stretched) in pairs.iter().zip(stretched.iter()) {
-            let (factor, information) = reported.factor(pair[0]).unwrap_or((1.0, LENGTH_INFORMATION[1]));
+            let (factor, information) = reported.factor(map, pair[0]).unwrap_or((1.0, LENGTH_INFORMATION[1]));
             change.push(factor - stretched);
             pull.push(information);
         }
@@ -243,35 +223,27 @@ impl Sizes {
             let factor = ((*total + change.clamp(-LENGTH_STEP, LENGTH_STEP)) / *total)
                 .clamp(shortest / *total, longest / *total);
             *total *= factor;
-            pair.iter().for_each(|limb| {
-                model.body.change_length(*limb, factor);
-            });
+            pair.iter().for_each(|limb| model.body.change_length(*limb, factor));
         }
         model.body.close_joints(poses);
     }
 
-    /// Updates the girths with the depth-contour edges on the sides of each limb.
-    fn refine_girths(&mut self, model: &mut Model, fit: &Fit, relied_on: impl Fn(usize) -> bool) {
+    /// Updates the girths with color edges, and those of limbs whose pose was known in the frame before with the depth-contour
+    /// edges on their sides.
+    pub(crate) fn refine_girths(
+        &mut self,
+        setting: Setting,
+        model: &mut Model,
+        poses: &[Pose],
+        fit: &mut Fit,
+        relied_on: impl Fn(usize) -> bool,
+    ) {
+        self.color_girths.follow(setting, model, poses, fit);
         for limb in (0..self.girths.len()).filter(|limb| relied_on(*limb)) {
-            let Some(prior) = GirthPrior::of(&model.body, limb, &self.girths) else { continue };
-            let shape = model.body.limbs()[limb].shape;
-            let (system, thickness) = side_system(&shape, fit.contours.sides(limb));
-            if let Some(axes) = self.girths[limb].follow(&system, ASIDE_SIGMA, 1.0, thickness, &prior) {
-                model.body.change_girth(limb, Vec3::ZERO, axes);
-            }
+            let (system, thickness) = side_system(&model.body.limbs()[limb].shape, fit.contours.sides(limb));
+            follow_girth(&mut self.girths, limb, &system, (ASIDE_SIGMA, 1.0), thickness, &mut model.body);
         }
     }
-}
-
-/// Which sizes a frame may update.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Reliance<F> {
-    /// The body was lost.
-    pub lost: bool,
-    /// Whether girths are updated.
-    pub girths: bool,
-    /// Whether the pose of a limb was known in the frame before.
-    pub limb: F,
 }
 
 #[cfg(test)]
@@ -348,8 +320,9 @@ mod tests {
             let (before, predicted) = (model.clone(), poses.clone());
             with_setting(&pixels, config, &before, &predicted, |setting| {
                 fit.run(setting.with_model(&model), &predicted, &mut poses);
-                let reliance = Reliance { lost, girths: true, limb: |_| true };
-                sizes.refine(setting, &mut model, &mut poses, &predicted, &mut fit, reliance);
+                let map = JointMap::default();
+                sizes.refine_lengths(setting, &mut model, &mut poses, &predicted, &mut fit, &map, lost);
+                sizes.refine_girths(setting, &mut model, &poses, &mut fit, |_| true);
             });
         }
         model.body
@@ -406,8 +379,9 @@ mod tests {
             let (before, predicted) = (model.clone(), poses.clone());
             with_setting(&pixels, &config, &before, &predicted, |setting| {
                 fit.run(setting.with_model(&model), &predicted, &mut poses);
-                let reliance = Reliance { lost: false, girths: true, limb: left };
-                sizes.refine(setting, &mut model, &mut poses, &predicted, &mut fit, reliance);
+                let map = JointMap::default();
+                sizes.refine_lengths(setting, &mut model, &mut poses, &predicted, &mut fit, &map, false);
+                sizes.refine_girths(setting, &mut model, &poses, &mut fit, left);
             });
         }
         for (index, limb) in body.limbs().iter().enumerate() {

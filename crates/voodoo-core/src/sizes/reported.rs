@@ -10,12 +10,7 @@ const KNOWN: f64 = 0.03;
 
 /// Running estimates of the logarithms of lengths, in the detector's order.
 #[derive(Debug, Default)]
-pub(super) struct ReportedLengths {
-    lengths: Vec<LengthEstimate>,
-    /// Index into `lengths` of every limb, and of the stature.
-    of_limb: Vec<Option<usize>>,
-    stature: Option<usize>,
-}
+pub(super) struct ReportedLengths(Vec<LengthEstimate>);
 
 /// Estimate of the logarithm of one length.
 #[derive(Clone, Copy, Debug, Default)]
@@ -28,17 +23,12 @@ struct LengthEstimate {
 }
 
 impl ReportedLengths {
-    /// Forgets everything.
-    pub(super) fn clear(&mut self) {
-        *self = Self::default();
-    }
-
     /// Updates the estimates with the lengths of a detection and their relative standard deviations. Errors of detections of one
     /// person are correlated, so all earlier detections together have only the information of the most precise one.
     pub(super) fn update(&mut self, detected: Detected) {
-        let reported = &detected.detection.lengths;
-        self.lengths.resize(self.lengths.len().max(reported.len()), LengthEstimate::default());
-        for ([length, sigma], known) in reported.iter().zip(&mut self.lengths) {
+        let (Self(lengths), reported) = (self, &detected.detection.lengths);
+        lengths.resize(lengths.len().max(reported.len()), LengthEstimate::default());
+        for ([length, sigma], known) in reported.iter().zip(lengths) {
             let (length, information, before) = (length.ln(), 1.0 / (sigma * sigma), known.information);
             if before == 0.0 {
                 (known.set, known.mean) = (length, length);
@@ -46,27 +36,19 @@ impl ReportedLengths {
             known.mean += (length - known.mean) * information / (information + before);
             known.information = information.max(before);
         }
-        self.bind(detected.map);
-    }
-
-    /// Renews the indices after the body's limbs were renumbered.
-    pub(super) fn bind(&mut self, map: &JointMap) {
-        self.of_limb.clear();
-        self.of_limb.extend_from_slice(map.length_of_limb());
-        self.stature = map.stature();
     }
 
     /// Whether the stature was reported, but with a standard deviation above `KNOWN`.
-    pub(super) fn is_uncertain(&self) -> bool {
-        let stature = self.stature.and_then(|stature| self.lengths.get(stature));
+    pub(super) fn is_uncertain(&self, map: &JointMap) -> bool {
+        let stature = map.stature.and_then(|stature| self.0.get(stature));
         stature.is_some_and(|stature| stature.information > 0.0 && stature.information < 1.0 / (KNOWN * KNOWN))
     }
 
     /// Returns the ratio of a limb's mean reported length to the length from which the sizes were set, and the information of
     /// that ratio, multiplied by `ALIKE` for comparison with that of one frame, whose points have correlated errors. `None` if
     /// the length was not reported.
-    pub(super) fn factor(&self, limb: usize) -> Option<(f64, f64)> {
-        let known = self.lengths.get(self.of_limb.get(limb).copied().flatten()?)?;
+    pub(super) fn factor(&self, map: &JointMap, limb: usize) -> Option<(f64, f64)> {
+        let known = self.0.get(map.length_of_limb(limb)?)?;
         (known.information > 0.0).then(|| ((known.mean - known.set).exp(), ALIKE * known.information))
     }
 }
@@ -83,16 +65,16 @@ mod tests {
         let names = ["stature", "thigh", "trunk"].map(String::from);
         let map = JointMap::new(&body, &[], &names);
         let mut lengths = ReportedLengths::default();
-        assert!(!lengths.is_uncertain(), "nobody was found");
+        assert!(!lengths.is_uncertain(&map), "nobody was found");
         for given in detections {
             let detection = Detection { lengths: vec![*given; names.len()], ..Detection::default() };
             lengths.update(Detected { detection: &detection, map: &map });
         }
-        let factor_of = |limb| body.limb_index(limb).ok().and_then(|limb| lengths.factor(limb));
+        let factor_of = |limb| body.limb_index(limb).ok().and_then(|limb| lengths.factor(&map, limb));
         let (factor, information) = factor_of("l_thigh").unwrap_or((f64::NAN, f64::NAN));
         assert_eq!(factor_of("pelvis"), factor_of("thorax"));
         assert_eq!(factor_of("l_calf"), None, "no shank is reported");
-        (factor, information, lengths.is_uncertain())
+        (factor, information, lengths.is_uncertain(&map))
     }
 
     #[test]

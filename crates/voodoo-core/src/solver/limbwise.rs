@@ -2,7 +2,7 @@
 
 use super::Problem;
 use crate::association::correspondence::LimbMatches;
-use crate::math::{Mat3, Moments, Pose, Vec3};
+use crate::math::{Moments, Pose, Vec3};
 
 /// Lever of the damping against rotation where the pairs do not determine it, meters: the girth of a limb.
 const STAY: f64 = 0.05;
@@ -58,5 +58,6 @@ fn surface_moments(matches: &LimbMatches, center: Vec3) -> Moments {
         }
     }
     let [w, x0, x1, x2, p0, p1, p2, products @ ..] = sums.map(|lanes| lanes.iter().sum::<f64>());
-    Moments { weight: w, x: Vec3::new(x0, x1, x2), p: Vec3::new(p0, p1, p2), px: Mat3::from_cols_array(&products) }
+    let px = [0, 1, 2].map(|axis| Vec3::from_slice(&products[3 * axis..]));
+    Moments { weight: w, x: Vec3::new(x0, x1, x2), p: Vec3::new(p0, p1, p2), px }
 }

@@ -99,7 +99,8 @@ impl WholeBody {
         let scale = narrowed(config.kernel_start, config.kernel_end, problem.step);
         let root = [config.root_turn_sigma, config.root_shift_sigma]
             .map(|sigma| sigma * problem.time_scale * config.motion_scale);
-        let measurements = Measurements::new(correspondences, config, scale, (3.0 * scale).max(SITE_SCALE), biased);
+        let scales = [scale, (3.0 * scale).max(SITE_SCALE)];
+        let measurements = Measurements { correspondences, config, scales, biased };
         let gain = still_prior_gain(problem, information);
         let free = Prior { predicted, root, joints: &self.joint_sigmas, holds: &[], rests: &self.rests };
         let holds = self.stillness.prior_gains(problem, &free, poses, gain);

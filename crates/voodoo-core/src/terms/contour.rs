@@ -20,11 +20,9 @@ pub(crate) struct Contour<'a> {
 impl Term for Contour<'_> {
     fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut NormalEquations) {
         for pair in self.pairs {
-            let (rho, kernel) = geman_mcclure(pair.distance, self.scale);
-            let information = self.information * pair.weight;
-            normal.cost += information * rho;
+            let information = self.information * pair.weight * geman_mcclure(pair.distance, self.scale);
             let row = line(pair.x, pair.normal);
-            normal.limbs[pair.limb].add_row(information * kernel, &row, -pair.distance);
+            normal.limbs[pair.limb].add_row(information, &row, -pair.distance);
         }
     }
 }

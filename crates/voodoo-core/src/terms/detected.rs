@@ -3,7 +3,7 @@
 use super::sites::APART;
 use super::{PATCH, Term};
 use crate::association::correspondence::DetectedPair;
-use crate::body::Body;
+use crate::body::{Body, Site};
 use crate::math::{Mat3, Pose};
 use crate::terms::normal_equations::NormalEquations;
 
@@ -22,22 +22,23 @@ pub(crate) struct DetectedJoints<'a> {
 }
 
 impl Term for DetectedJoints<'_> {
-    fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut NormalEquations) {
-        for DetectedPair { limb, x, p, sigma, information, .. } in self.pairs {
-            let r = *x - *p;
+    fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations) {
+        for DetectedPair { site, p, sigma, information } in self.pairs {
+            let Site { limb, position, .. } = body.sites()[*site];
+            let x = poses[limb] * position;
+            let r = x - *p;
             let far = r.length_squared() / (FAR_SIGMAS * FAR_SIGMAS * sigma * sigma);
             let information = information / ((1.0 + far) * (1.0 + far));
-            normal.cost += information * (1.0 + far) * r.length_squared();
-            normal.limbs[*limb].add_point(&(Mat3::IDENTITY * information), *x, r);
+            normal.limbs[limb].add_point(&(Mat3::IDENTITY * information), x, r);
         }
     }
 
-    fn cost(&self, _body: &Body, poses: &[Pose], limb: usize) -> f64 {
+    fn cost(&self, body: &Body, poses: &[Pose], limb: usize) -> f64 {
         let cost = |pair: &DetectedPair| {
-            let off = (poses[limb] * pair.local).distance(pair.p) - WITHIN_SIGMAS * pair.sigma;
+            let off = (poses[limb] * body.sites()[pair.site].position).distance(pair.p) - WITHIN_SIGMAS * pair.sigma;
             PATCH * ELSEWHERE_COST * (off.max(0.0) / APART).powi(2).min(1.0)
         };
-        self.pairs.iter().filter(|pair| pair.limb == limb).map(cost).sum()
+        self.pairs.iter().filter(|pair| body.sites()[pair.site].limb == limb).map(cost).sum()
     }
 }
 
@@ -52,8 +53,8 @@ mod tests {
     fn a_joint_costs_nothing_within_its_deviation_and_a_limited_amount_far_off() {
         let (model, poses) = standing();
         let cost = |off: f64| {
-            let (limb, p) = (3, poses[3].translation);
-            let pair = DetectedPair { limb, local: Vec3::ZERO, x: p, p, sigma: 0.05, information: 1.0 };
+            let Site { limb, position, .. } = model.body.sites()[3];
+            let pair = DetectedPair { site: 3, p: poses[limb] * position, sigma: 0.05, information: 1.0 };
             let shifted = moved(&poses, off * Vec3::Y);
             (0..poses.len())
                 .map(|limb| DetectedJoints { pairs: &[pair] }.cost(&model.body, &shifted, limb))

@@ -23,7 +23,6 @@ impl Term for Floor {
             let end = *pose * (Vec3::Z * limb.shape.length());
             let depth = -self.plane.height(end);
             if depth > 0.0 {
-                normal.cost += weight * depth * depth;
                 normal.limbs[index].add_row(weight, &-line(end, self.plane.normal), depth);
             }
         }

@@ -4,13 +4,12 @@ use super::{PATCH, Term};
 use crate::body::Body;
 use crate::math::Pose;
 use crate::observation::depth_view::DepthViews;
-use crate::terms::normal_equations::NormalEquations;
 use crate::visibility::evidence::limb_visibility;
 
 /// Cost of a patch that violates free space, in unexplained patches.
 const VIOLATION: f64 = 0.6;
 
-/// Patches of the surface that violate free space.
+/// Patches of the surface that violate free space. It moves none: [`super::Contour`] moves a limb to the edge of what is observed.
 #[derive(Debug)]
 pub(crate) struct FreeSpace<'a> {
     /// The depth images.
@@ -18,9 +17,6 @@ pub(crate) struct FreeSpace<'a> {
 }
 
 impl Term for FreeSpace<'_> {
-    /// No rows: [`super::Contour`] moves a limb to the edge of what is observed.
-    fn add(&self, _body: &Body, _poses: &[Pose], _normal: &mut NormalEquations) {}
-
     fn cost(&self, body: &Body, poses: &[Pose], limb: usize) -> f64 {
         VIOLATION * PATCH * limb_visibility(self.views, &body.limbs()[limb], &poses[limb]).free_space
     }

@@ -1,7 +1,7 @@
 //! Joint limits, one-sided and soft: each component of the joint's rotation vector stays in its range.
 
 use super::Term;
-use crate::body::{Body, Joint};
+use crate::body::Body;
 use crate::math::{Pose, Quat, Vec3, rotation_vector};
 use crate::terms::normal_equations::NormalEquations;
 
@@ -25,9 +25,7 @@ impl Term for Limits {
     }
 
     fn cost(&self, body: &Body, poses: &[Pose], limb: usize) -> f64 {
-        let Some((parent, joint)) = &body.limbs()[limb].parent else { return 0.0 };
-        let Some(limits) = &joint.limits else { return 0.0 };
-        let (_, v) = turn_in_joint(joint, &poses[*parent], &poses[limb]);
+        let Some((limits, _, v)) = limited_turn(body, poses, limb) else { return 0.0 };
         let excess = |(axis, [low, high]): (usize, &[f64; 2])| (low - v[axis]).max(v[axis] - high).max(0.0);
         let squares: f64 = limits.iter().enumerate().map(|limit| (excess(limit) / self.sigma).powi(2)).sum();
         (0.5 * squares).min(LARGEST_LIMIT_COST)
@@ -42,23 +40,24 @@ pub(super) fn add_angles(
     normal: &mut NormalEquations,
     row: impl Fn(f64, [f64; 2]) -> Option<(f64, f64)>,
 ) {
-    for (limb, parent, joint) in body.joints() {
-        let Some(limits) = &joint.limits else { continue };
-        let (world_from_joint, v) = turn_in_joint(joint, &poses[parent], &poses[limb]);
+    for limb in 0..poses.len() {
+        let Some((limits, world_from_joint, v)) = limited_turn(body, poses, limb) else { continue };
         for (axis, limits) in limits.iter().enumerate() {
             let Some((weight, residual)) = row(v[axis], *limits) else { continue };
             // d v = J^-1 (relative rotation in the joint frame); one row of the inverse left Jacobian.
             normal.joints[limb].add_row(weight, world_from_joint * inverse_left_jacobian_row(v, axis), residual);
-            normal.cost += weight * residual * residual;
         }
     }
 }
 
-/// The joint's axes in the world frame, and the rotation vector of its rotation in the joint frame, radians.
-fn turn_in_joint(joint: &Joint, parent: &Pose, limb: &Pose) -> (Quat, Vec3) {
-    let world_from_joint = parent.rotation * joint.parent_from_joint.rotation;
-    let turned = world_from_joint.inverse() * limb.rotation * joint.limb_from_joint.rotation;
-    (world_from_joint, rotation_vector(turned))
+/// The limits of a limb's joint, the joint's axes in the world frame, and the rotation vector of its rotation in the joint frame,
+/// radians; `None` without limits.
+fn limited_turn<'a>(body: &'a Body, poses: &[Pose], limb: usize) -> Option<(&'a [[f64; 2]; 3], Quat, Vec3)> {
+    let (parent, joint) = body.limbs()[limb].parent.as_ref()?;
+    let limits = joint.limits.as_ref()?;
+    let world_from_joint = poses[*parent].rotation * joint.parent_from_joint.rotation;
+    let turned = world_from_joint.inverse() * poses[limb].rotation * joint.limb_from_joint.rotation;
+    Some((limits, world_from_joint, rotation_vector(turned)))
 }
 
 /// Row `axis` of the inverse left Jacobian of the rotation vector `v`: `J^-1 = I - [v]/2 + k [v]^2` with

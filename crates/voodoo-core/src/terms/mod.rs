@@ -45,8 +45,8 @@ const LARGEST_COST: f64 = 10.0;
 /// which is limited, because no model of an error holds far away, and lower than the sum of squares, because nearby measurements
 /// err alike.
 pub(crate) trait Term {
-    /// Adds cost, gradient and information at `poses` (working frame).
-    fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations);
+    /// Adds gradient and information at `poses` (working frame). Terms that move nothing have none.
+    fn add(&self, _body: &Body, _poses: &[Pose], _normal: &mut NormalEquations) {}
 
     /// Negative log-likelihood of the pose of one limb, nats. Terms that do not tell such poses apart have none.
     fn cost(&self, _body: &Body, _poses: &[Pose], _limb: usize) -> f64 {
@@ -57,36 +57,27 @@ pub(crate) trait Term {
 /// The terms of all measurements: those that the solver fits and from which covariances follow.
 #[derive(Debug)]
 pub(crate) struct Measurements<'a> {
-    surface: Surface<'a>,
-    sites: Sites<'a>,
-    contour: Contour<'a>,
-    regions: Regions<'a>,
-}
-
-impl<'a> Measurements<'a> {
-    /// The terms of `correspondences`, with kernels of `scale` for points and `site_scale` for sites, meters; `biased` as in
-    /// [`Sites`].
-    pub(crate) fn new(
-        correspondences: &'a Correspondences,
-        config: &Config,
-        scale: f64,
-        site_scale: f64,
-        biased: bool,
-    ) -> Self {
-        let information = 1.0 / (config.point_sigma * config.point_sigma);
-        let edge_information = 1.0 / (config.depth_contour_sigma * config.depth_contour_sigma);
-        Self {
-            surface: Surface { correspondences, information, tangential_weight: config.tangential_weight, scale },
-            sites: Sites { correspondences, information, scale: site_scale, biased },
-            contour: Contour { pairs: &correspondences.contour, information: edge_information, scale },
-            regions: Regions { pairs: &correspondences.regions, colors: None },
-        }
-    }
+    /// The measurements.
+    pub correspondences: &'a Correspondences,
+    /// Parameters.
+    pub config: &'a Config,
+    /// Scales of the kernels of points and of sites, meters.
+    pub scales: [f64; 2],
+    /// As in [`Sites`].
+    pub biased: bool,
 }
 
 impl Term for Measurements<'_> {
     fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations) {
-        let terms: [&dyn Term; 4] = [&self.surface, &self.sites, &self.contour, &self.regions];
+        let Self { correspondences, config, scales: [scale, site_scale], biased } = *self;
+        let information = 1.0 / (config.point_sigma * config.point_sigma);
+        let edge_information = 1.0 / (config.depth_contour_sigma * config.depth_contour_sigma);
+        let terms: [&dyn Term; 4] = [
+            &Surface { correspondences, information, tangential_weight: config.tangential_weight, scale },
+            &Sites { correspondences, information, scale: site_scale, biased },
+            &Contour { pairs: &correspondences.contour, information: edge_information, scale },
+            &Regions { pairs: &correspondences.regions, colors: None },
+        ];
         for term in terms {
             term.add(body, poses, normal);
         }

@@ -26,15 +26,13 @@ pub(crate) struct JointBlock {
     pub g: Vector3<f64>,
 }
 
-/// The whole system and its cost.
+/// The whole system.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct NormalEquations {
     /// One block per limb.
     pub limbs: Vec<LimbBlock>,
     /// One block per limb, for its joint; unused for the root.
     pub joints: Vec<JointBlock>,
-    /// Value of the cost.
-    pub cost: f64,
 }
 
 impl NormalEquations {
@@ -42,7 +40,6 @@ impl NormalEquations {
     pub(crate) fn clear(&mut self, limbs: usize) {
         reset(&mut self.limbs, limbs, LimbBlock::default());
         reset(&mut self.joints, limbs, JointBlock::default());
-        self.cost = 0.0;
     }
 }
 

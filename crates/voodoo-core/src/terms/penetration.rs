@@ -23,12 +23,20 @@ pub(crate) struct Penetration<'a> {
 
 impl Term for Penetration<'_> {
     fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations) {
-        let limbs = body.limbs();
-        for first in 1..limbs.len() {
+        let weight = 1.0 / (self.sigma * self.sigma);
+        for first in 1..poses.len() {
             for second in 0..first {
-                if overlap(self.spheres[first], self.spheres[second]) && body.are_apart(first, second) {
-                    self.add_points(body, poses, [first, second], normal);
-                    self.add_points(body, poses, [second, first], normal);
+                if !overlap(self.spheres[first], self.spheres[second]) || !body.are_apart(first, second) {
+                    continue;
+                }
+                for [limb, other] in [[first, second], [second, first]] {
+                    each_overlap(body, poses, [limb, other], |place, normal_there, overlap| {
+                        // The distance grows when the point moves along the normal, and when the surface moves against it.
+                        let row = line(place, normal_there);
+                        // The mixed block of the two twists is left out: the system only has blocks of single limbs and joints.
+                        normal.limbs[limb].add_row(weight, &-row, overlap);
+                        normal.limbs[other].add_row(weight, &row, overlap);
+                    });
                 }
             }
         }
@@ -44,21 +52,6 @@ impl Term for Penetration<'_> {
             }
         }
         squares.min(LARGEST_COST)
-    }
-}
-
-impl Penetration<'_> {
-    /// Points of `limb` against the surface of `other`.
-    fn add_points(&self, body: &Body, poses: &[Pose], [limb, other]: [usize; 2], normal: &mut NormalEquations) {
-        let weight = 1.0 / (self.sigma * self.sigma);
-        each_overlap(body, poses, [limb, other], |place, normal_there, overlap| {
-            // The distance grows when the point moves along the normal, and when the surface moves against it.
-            let row = line(place, normal_there);
-            normal.cost += weight * overlap * overlap;
-            // The mixed block of the two twists is left out: the system only has blocks of single limbs and joints.
-            normal.limbs[limb].add_row(weight, &-row, overlap);
-            normal.limbs[other].add_row(weight, &row, overlap);
-        });
     }
 }
 

@@ -42,7 +42,8 @@ mod tests {
         let mut normal = NormalEquations::default();
         normal.clear(poses.len());
         Posture { fraction: 0.25 }.add(body, poses, &mut normal);
-        normal.cost
+        // The least squares of a joint's residuals, of which no two are about the same axis.
+        normal.joints.iter().map(|joint| joint.g.dot(&(joint.h.pseudo_inverse(1e-9).unwrap() * joint.g))).sum()
     }
 
     #[test]

@@ -44,7 +44,7 @@ pub(crate) struct Rest {
 impl Prior<'_> {
     /// Writes the stillness of the root (first) and of each joint: 1 where they are as predicted, towards 0 where they move.
     pub(crate) fn stillness(&self, body: &Body, poses: &[Pose], stillness: &mut Vec<f64>) {
-        let fraction = |deviation: f64| geman_mcclure(deviation, WELL).1;
+        let fraction = |deviation: f64| geman_mcclure(deviation, WELL);
         stillness.clear();
         stillness.extend(body.limbs().iter().enumerate().map(|(index, limb)| match &limb.parent {
             None => {
@@ -79,7 +79,6 @@ impl Term for Prior<'_> {
         let hold = |index: usize| self.holds.get(index).copied().unwrap_or(0.0);
         let (turn, shift) =
             (information(self.root[0], ROOT_FRACTION * hold(0)), information(self.root[1], ROOT_FRACTION * hold(0)));
-        normal.cost += turn * r.length_squared() + shift * d.length_squared();
         let block = &mut normal.limbs[0];
         for (i, axis) in [Vec3::X, Vec3::Y, Vec3::Z].into_iter().enumerate() {
             block.h[(i, i)] += turn;
@@ -91,7 +90,6 @@ impl Term for Prior<'_> {
             let r = poses[parent].rotation * self.turn(poses, parent, index);
             let weight = information(self.joints[index], hold(index));
             normal.joints[index].add_turn(weight, r);
-            normal.cost += weight * r.length_squared();
         }
     }
 }

@@ -28,7 +28,6 @@ pub(crate) struct Colors<'a> {
 impl Term for Regions<'_> {
     fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut NormalEquations) {
         for pair in self.pairs {
-            normal.cost += pair.information * pair.distance * pair.distance;
             let row = line(pair.x, pair.normal);
             normal.limbs[pair.limb].add_row(pair.information, &row, -pair.distance);
         }

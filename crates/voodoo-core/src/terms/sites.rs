@@ -26,9 +26,8 @@ impl Term for Sites<'_> {
     fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut NormalEquations) {
         for pair in self.correspondences.sites.iter().filter(|pair| self.biased || pair.bias <= 0.0) {
             let r = pair.x - pair.p;
-            let (rho, kernel) = geman_mcclure(r.length(), self.scale);
-            normal.cost += pair.weight * self.information * rho;
-            normal.limbs[pair.limb].add_point(&(pair.information * (self.information * kernel)), pair.x, r);
+            let kernel = geman_mcclure(r.length(), self.scale);
+            normal.limbs[pair.limb].add_point(&(pair.across * pair.weight * (self.information * kernel)), pair.x, r);
         }
     }
 
@@ -57,9 +56,8 @@ mod tests {
         // The origin of the limb's frame, measured at an offset.
         let pair = |off: Vec3| {
             let x = poses[limb].translation;
-            let (across, information) = (Mat3::IDENTITY, 2.0 * Mat3::IDENTITY);
-            let (local, p) = (Vec3::ZERO, x + off);
-            SitePair { limb, local, x, p, weight: 2.0, base_weight: 2.0, bias: 0.0, across, information, source: 0 }
+            let (local, p, across) = (Vec3::ZERO, x + off, Mat3::IDENTITY);
+            SitePair { limb, local, x, p, weight: 2.0, base_weight: 2.0, bias: 0.0, across, source: 0 }
         };
         let cost_at = |pair: SitePair, poses: &[Pose]| {
             let correspondences = Correspondences { sites: vec![pair], ..Correspondences::default() };

@@ -5,12 +5,11 @@ use crate::body::Body;
 use crate::body::two_bone::TwoBone;
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::Ground;
-use crate::terms::normal_equations::NormalEquations;
 
 /// Standard deviation of the direction of a thigh or calf, radians.
 const STANCE_SIGMA: f64 = 0.6;
 
-/// All legs.
+/// All legs. It moves none: any leg that is shown is measured far better.
 #[derive(Debug)]
 pub(crate) struct Stance<'a> {
     /// Arms and legs.
@@ -20,9 +19,6 @@ pub(crate) struct Stance<'a> {
 }
 
 impl Term for Stance<'_> {
-    /// No rows: any leg that is shown is measured far better.
-    fn add(&self, _body: &Body, _poses: &[Pose], _normal: &mut NormalEquations) {}
-
     fn cost(&self, body: &Body, poses: &[Pose], limb: usize) -> f64 {
         let Some(leg) = self.extremities.iter().find(|one| one.leg && (one.upper == limb || one.lower == limb)) else {
             return 0.0;

@@ -23,18 +23,17 @@ pub(crate) struct Surface<'a> {
     pub scale: f64,
 }
 
-/// Geman-McClure: `rho(r) = r^2 / (1 + r^2 / c^2)`, weight `rho'(r) / (2 r) = 1 / (1 + r^2 / c^2)^2`.
-pub(super) fn geman_mcclure(r: f64, scale: f64) -> (f64, f64) {
-    let square = r * r;
-    let denominator = 1.0 + square / (scale * scale);
-    (square / denominator, 1.0 / (denominator * denominator))
+/// Weight under Geman-McClure's kernel `rho(r) = r^2 / (1 + r^2 / c^2)`: `rho'(r) / (2 r) = 1 / (1 + r^2 / c^2)^2`.
+pub(super) fn geman_mcclure(r: f64, scale: f64) -> f64 {
+    let denominator = 1.0 + r * r / (scale * scale);
+    1.0 / (denominator * denominator)
 }
 
 impl Term for Surface<'_> {
     fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut NormalEquations) {
         for (matches, block) in self.correspondences.limbs.iter().zip(&mut normal.limbs) {
             let sums = vectorized!(self.sum(matches));
-            normal.cost += sums.add_to(block, matches.radius_variance);
+            sums.add_to(block, matches.radius_variance);
         }
     }
 
@@ -55,8 +54,8 @@ type SurfaceLanes = [f32; LANES];
 
 /// Sums over the points of a limb, each split into lanes. The sums are in single precision, as are the points, which lie near
 /// the working frame's origin.
+#[derive(Default)]
 struct Sums {
-    cost: SurfaceLanes,
     /// Lower triangle of the point-to-plane information, row by row.
     plane: [SurfaceLanes; 21],
     gradient: [SurfaceLanes; 6],
@@ -70,14 +69,7 @@ struct Sums {
 impl Surface<'_> {
     #[inline(always)]
     fn sum(&self, matches: &LimbMatches) -> Sums {
-        let mut sums = Sums {
-            cost: [0.0; LANES],
-            plane: [[0.0; LANES]; 21],
-            gradient: [[0.0; LANES]; 6],
-            radius: [[0.0; LANES]; 2],
-            shared: [[0.0; LANES]; 6],
-            iso: [[0.0; LANES]; 10],
-        };
+        let mut sums = Sums::default();
         let (points, normals) = (&matches.surface.points, &matches.surface.normals);
         let columns = [
             &points.x,
@@ -120,9 +112,7 @@ impl Surface<'_> {
         for l in 0..LANES {
             let square = distance[l] * distance[l];
             let falloff = 1.0 / (1.0 + square * inverse_square);
-            let weight = weight[l] * own[l] * information;
-            sums.cost[l] += weight * square * falloff;
-            let weight = weight * falloff * falloff;
+            let weight = weight[l] * own[l] * information * falloff * falloff;
             // The residual n . (x - p) is the negative signed distance of the measured point.
             pull[l] = -weight * distance[l];
             all[l] = weight;
@@ -190,8 +180,8 @@ impl Sums {
         }
     }
 
-    /// Adds the sums to a limb's normal equations, without its radius; returns the cost.
-    fn add_to(&self, block: &mut LimbBlock, radius_variance: f64) -> f64 {
+    /// Adds the sums to a limb's normal equations, without its radius.
+    fn add_to(&self, block: &mut LimbBlock, radius_variance: f64) {
         let total = |lanes: &SurfaceLanes| lanes.iter().map(|value| f64::from(*value)).sum::<f64>();
         let mut entry = 0;
         for i in 0..6 {
@@ -214,7 +204,6 @@ impl Sums {
                 block.h[(i, j)] -= variance * shared[i] * shared[j];
             }
         }
-        total(&self.cost) - variance * pull * pull
     }
 }
 

@@ -10,14 +10,14 @@ use crate::shape::TaperedEllipticCylinder;
 impl BodyTracker {
     /// Scales the whole body about its root.
     pub fn scale(&mut self, factor: f64) -> Result<(), BodyError> {
-        self.model.scale(factor)?;
+        self.model.edit(|body| body.scaled(factor))?;
         self.edited();
         Ok(())
     }
 
     /// Changes the dimensions of one limb.
     pub fn set_shape(&mut self, limb: &str, shape: TaperedEllipticCylinder) -> Result<(), BodyError> {
-        self.model.set_shape(limb, shape)?;
+        self.model.edit(|body| body.with_shape(limb, shape))?;
         self.edited();
         Ok(())
     }
@@ -31,7 +31,7 @@ impl BodyTracker {
         joint: Joint,
         sites: Vec<(String, Vec3)>,
     ) -> Result<(), BodyError> {
-        self.model.add_limb(name, parent, shape, &joint, &sites)?;
+        self.model.edit(|body| body.with_limb(name, parent, shape, joint.clone(), sites.clone()))?;
         if self.is_started()
             && let Some((parent, joint)) = self.model.body.limbs().last().and_then(|limb| limb.parent.as_ref())
         {
@@ -43,7 +43,8 @@ impl BodyTracker {
 
     /// Removes a limb with all its descendants.
     pub fn remove_limb(&mut self, name: &str) -> Result<(), BodyError> {
-        let kept = self.model.remove_limb(name)?;
+        let (_, kept) = self.model.body.without_limb(name)?;
+        self.model.edit(|body| body.without_limb(name).map(|(body, _)| body))?;
         if self.is_started() {
             self.motion.poses = kept.iter().map(|index| self.motion.poses[*index]).collect();
         }
@@ -68,7 +69,7 @@ impl BodyTracker {
         }
         model.body.close_joints(&mut motion.poses);
         fit.clear();
-        sizes.edited(model, relocalizer.detector.map());
+        sizes.edited(model);
         relocalizer.restart(model, &motion.poses);
         assessor.restart(estimate.status);
         self.report(self.motion.stamp.unwrap_or(f64::NAN), 0, None);

@@ -19,7 +19,7 @@ use crate::observation::frame::Frame;
 use crate::observation::observer::{Observer, Own};
 use crate::observation::ownership::OwnershipMask;
 use crate::relocalize::{DetectionVerdict, Reasons, Relocalizer, distance_cost, trunk_is_elsewhere};
-use crate::sizes::{Reliance, Sizes, Start};
+use crate::sizes::{Sizes, Start};
 use crate::uncertainty::{FittedPose, Uncertainty};
 use assess::Assessor;
 use estimate::{Estimate, LimbStatus, Status};
@@ -247,7 +247,7 @@ impl BodyTracker {
         }
         let origin = motion.origin;
         let root = origin + motion.expect(&model.body, frame.stamp, config.prediction)[0].translation;
-        let suspect = hypotheses.has_excess() || sizes.is_uncertain();
+        let suspect = hypotheses.has_excess() || sizes.is_uncertain(relocalizer.detector.map());
         let reasons = Reasons {
             uncertain: suspect || assessor.is_uncertain(&model.extremities),
             anywhere: interrupted,
@@ -301,8 +301,8 @@ impl BodyTracker {
         if let Some((image, pixels)) = moved_to {
             observer.release(frame, ownership, Own { image: *image, pixels });
         }
-        observer.gather(frame, *origin, &body_box(&model.body, poses, config.body_box_margin), ownership, config);
-        let observation = observer.observation(frame, *origin, ownership);
+        let bounds = body_box(&model.body, poses, config.body_box_margin);
+        let observation = observer.gather(frame, *origin, &bounds, ownership, config);
         let setting = Setting { config, observation, previous, time_scale };
         // One with the trunk elsewhere is another person's, or the track is wrong.
         let here = |detected: &Detected| !trunk_is_elsewhere(*detected, &model.body, poses, *origin);
@@ -326,8 +326,10 @@ impl BodyTracker {
         }
         // Refinement of the sizes with this frame.
         let lost = assessor.status == Status::Lost;
-        let reliance = Reliance { lost, girths: whole_body, limb: |limb| assessor.is_reliable(limb) };
-        sizes.refine(setting, model, poses, predicted, fit, reliance);
+        sizes.refine_lengths(setting, model, poses, predicted, fit, relocalizer.detector.map(), lost);
+        if whole_body {
+            sizes.refine_girths(setting, model, poses, fit, |limb| assessor.is_reliable(limb));
+        }
         // Assessment: status of the body and its limbs.
         assessor.assess(setting.with_model(model), fit.matched(poses), relocalizer.detected());
         if config.regions {
@@ -411,8 +413,7 @@ impl BodyTracker {
     fn reassess(&mut self, frame: &Frame, ownership: OwnershipMask) {
         let Self { config, model, motion: Motion { poses, previous, origin, .. }, observer, fit, assessor, .. } = self;
         let bounds = body_box(&model.body, poses, config.body_box_margin);
-        observer.gather(frame, *origin, &bounds, ownership, config);
-        let observation = observer.observation(frame, *origin, ownership);
+        let observation = observer.gather(frame, *origin, &bounds, ownership, config);
         let setting = Setting { config, observation, previous, time_scale: 1.0 };
         fit.match_all(setting.with_model(model), poses, config.max_steps, true);
         assessor.moved();
@@ -428,7 +429,7 @@ impl BodyTracker {
     fn report(&mut self, stamp: f64, steps: usize, time_scale: Option<f64>) {
         let Self { config, model, motion, observer, fit, hypotheses, sizes, assessor, uncertainty, estimate, .. } =
             self;
-        estimate.fill(&model.body, motion, &fit.correspondences, observer.candidates());
+        estimate.fill(&model.body, motion, &fit.correspondences, &observer.candidates);
         (estimate.stamp, estimate.steps) = (stamp, steps);
         let Some(time_scale) = time_scale else {
             assessor.report_status(model, estimate);

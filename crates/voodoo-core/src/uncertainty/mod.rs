@@ -149,8 +149,8 @@ impl Uncertainty {
         let FittedPose { model: Model { body, .. }, poses, correspondences, config, .. } = found;
         let normal = &mut self.spread.normal;
         normal.clear(poses.len());
-        let measurements = Measurements::new(correspondences, config, config.kernel_end, SITE_SCALE, true);
-        measurements.add(body, poses, normal);
+        let scales = [config.kernel_end, SITE_SCALE];
+        Measurements { correspondences, config, scales, biased: true }.add(body, poses, normal);
         for (limb, block) in normal.limbs.iter_mut().enumerate() {
             let most = PATCHES_PER_METER * body.limbs()[limb].shape.length();
             let lines = correspondences.regions.iter().filter(|pair| pair.limb == limb).count();
