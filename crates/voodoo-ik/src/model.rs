@@ -66,8 +66,6 @@ pub struct Column {
 /// Poses and derivatives at one vector of angles; memory to be reused.
 #[derive(Clone, Debug, Default)]
 pub struct Kinematics {
-    /// World pose of the base.
-    pub base: Pose,
     /// World pose of every link.
     pub poses: Vec<Pose>,
     /// One column per unknown.
@@ -157,8 +155,7 @@ impl ChainModel {
 
     /// Forward kinematics and its derivative (R07 eq. 10): poses of all links and the screw of every unknown.
     pub fn place(&self, world_from_base: &Pose, angles: &[f64], at: &mut Kinematics) {
-        let Kinematics { base, poses, columns } = at;
-        *base = *world_from_base;
+        let Kinematics { poses, columns } = at;
         poses.clear();
         columns.clear();
         for link in &self.links {
