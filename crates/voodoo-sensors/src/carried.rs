@@ -55,13 +55,7 @@ fn around(points: &[Vec3], motion: &LimbMotion) -> Vec<usize> {
 
 /// Moves the points that may be on a limb, given for each limb their distances from it, meters: for some time, in seconds, with a
 /// fraction of the limb's velocity.
-fn carry(
-    points: &mut [Vec3],
-    around: &[usize],
-    away: &[Vec<f32>],
-    motion: &LimbMotion,
-    [elapsed, fraction]: [f64; 2],
-) {
+fn carry(points: &mut [Vec3], around: &[usize], away: &[Vec<f32>], motion: &LimbMotion, [elapsed, fraction]: [f64; 2]) {
     let changes: Vec<Affine3> = (0..away.len()).map(|limb| change(motion, limb, fraction)).collect();
     for (column, &index) in around.iter().enumerate() {
         let mut nearest = (0, f32::INFINITY);
