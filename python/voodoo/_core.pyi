@@ -7,19 +7,19 @@ from typing import Any, ClassVar, Protocol, final
 import numpy as np
 import numpy.typing as npt
 
+from voodoo.detectors.base import Detection, PersonCandidate
+
 __all__ = [
     "Body",
     "Camera",
     "Chain",
     "ClosestPoints",
-    "Detection",
     "Detector",
     "Estimate",
     "Frame",
     "KeypointLayout",
     "Layout",
     "People",
-    "PersonCandidate",
     "SiteGate",
     "SiteRay",
     "SkinCue",
@@ -669,26 +669,6 @@ class Frame:
             MeasurementError: not three numbers; the step rejects corners that are not finite or in the wrong order.
         """
 
-@final
-class PersonCandidate:
-    """A person candidate in a depth image, with the crop that is the network's input. Camera frame, meters."""
-
-    @property
-    def crop(self) -> npt.NDArray[np.float32]:
-        """Input of the network (2, 96, 96): depth relative to the center, scaled so that +-1.2 m is +-1, and the mask."""
-    @property
-    def mask(self) -> npt.NDArray[np.bool_]:
-        """Its pixels (H, W) in the depth image."""
-    @property
-    def middle(self) -> tuple[float, float, float]:
-        """Center of the crop: (x/z, y/z) in the camera rotated by `roll`, and the depth [m]."""
-    @property
-    def roll(self) -> float:
-        """Rotation of the camera about its optical axis that makes the vertical point up in the image [rad]."""
-    @property
-    def floor(self) -> tuple[tuple[float, float, float], float] | None:
-        """Normal and offset of the ground plane, given or detected."""
-
 def person_candidates(
     depth: npt.NDArray[np.float32],
     *,
@@ -745,44 +725,6 @@ class Detector:
         Raises:
             MeasurementError: a measurement that cannot be used.
         """
-
-@final
-class Detection:
-    """A person in a depth image. World frame, meters."""
-
-    @property
-    def joints(self) -> dict[str, npt.NDArray[np.float64]]:
-        """Joint name -> position (3,) [m]; `l_` and `r_` are the person's own."""
-    @property
-    def joint_sigma(self) -> dict[str, float]:
-        """Joint name -> standard deviation along each axis [m]."""
-    @property
-    def visible(self) -> dict[str, float]:
-        """Joint name -> probability that it is in the image and not occluded."""
-    @property
-    def lengths(self) -> dict[str, float]:
-        """Upper arm, forearm, thigh, shank, shoulder and hip width, trunk, neck and stature [m]."""
-    @property
-    def length_sigma(self) -> dict[str, float]:
-        """Names as in `lengths` -> standard deviation [m]."""
-    @property
-    def stature(self) -> float:
-        """Height of the person when standing upright [m]."""
-    @property
-    def facing(self) -> float:
-        """Probability that the front of the trunk faces the camera."""
-    @property
-    def confidence(self) -> float:
-        """Probability that it is a person."""
-    @property
-    def source(self) -> str:
-        """Source name of the depth image in which it was detected."""
-    @property
-    def mask(self) -> npt.NDArray[np.bool_]:
-        """The person's pixels (H, W) in that image."""
-    @property
-    def floor(self) -> tuple[tuple[float, float, float], float] | None:
-        """Ground plane, detected or given by the frame: unit normal (3,) upwards and height along it [m]; or None."""
 
 @final
 class Estimate:

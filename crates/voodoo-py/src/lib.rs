@@ -38,7 +38,7 @@ use pyo3::prelude::*;
 mod _core {
     #[cfg(feature = "detect")]
     #[pymodule_export]
-    use super::detect::{PyCandidate, PyDetection, PyDetector, person_candidates};
+    use super::detect::{PyDetector, person_candidates};
     #[pymodule_export]
     use super::{
         body::PyBody,
