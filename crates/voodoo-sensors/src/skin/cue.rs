@@ -246,7 +246,7 @@ impl SkinCue {
                     .map(|index| ranges[*index])
                     .collect();
                 near.sort_unstable_by(f64::total_cmp);
-                let direction = input.eye.direction(input.eye.undistorted(pixel));
+                let direction = input.eye.direction(pixel);
                 let range = (near.len() >= 3).then(|| near[near.len() / 2] / direction.dot(input.eye.axis()));
                 let surface = range.map(|range| input.eye.origin() + range * direction);
                 if direction.is_finite() {
