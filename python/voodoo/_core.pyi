@@ -334,12 +334,12 @@ def euler_angles(quaternions: npt.NDArray[np.float64], order: tuple[int, int, in
     """
 
 def skeleton(
-    bodies: Sequence[Body],
+    body: Body,
     poses: npt.NDArray[np.float64],
     joints: npt.NDArray[np.float64],
     own: npt.NDArray[np.int64],
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Rotations world_from_bone (F, L, 3, 3) and heads (F, L, 3) of poses (F, L, 4, 4) of one body, or of one of each frame.
+    """Rotations world_from_bone (F, L, 3, 3) and heads (F, L, 3) of poses (F, L, 4, 4) of a body.
 
     Rows of `own` are limbs whose joint to the parent is one of joints (F, J, 3), and the number of that.
     """
@@ -369,9 +369,9 @@ def joint_angles(
 def moved_covariances(covariances: npt.NDArray[np.float64], across: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """Covariances (F, 6, 6) of poses of points that are away by (F, 3) from those whose covariances are given."""
 
-def cylinders(bodies: Sequence[Body], poses: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Of poses (F, L, 4, 4) of one body, or of one of each frame: middle, rotation x, y, z, w, both diameters, length, and scales
-    of both ends of each limb's cylinder (F, 12 L)."""
+def cylinders(body: Body, poses: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Of poses (F, L, 4, 4) of a body: middle, rotation x, y, z, w, both diameters, length, and scales of both ends of each limb's
+    cylinder (F, 12 L)."""
 
 def carried(
     points: _Points,
@@ -895,14 +895,7 @@ class Chain:
     """A kinematic chain of the core; use voodoo.ik.Chain."""
 
     def __new__(cls, body: Body, limbs: Sequence[str], free_root: bool) -> Chain: ...
-    @property
-    def angle_names(self) -> list[str]: ...
-    @property
-    def limits(self) -> list[list[float]]: ...
-    @property
-    def limb_names(self) -> list[str]: ...
-    @property
-    def site_names(self) -> list[str]: ...
+    def parts(self) -> tuple[list[str], list[list[float]], list[str], list[str]]: ...
     def forward(
         self, base: npt.ArrayLike, angles: npt.NDArray[np.float64]
     ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...

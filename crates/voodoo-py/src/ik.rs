@@ -37,7 +37,7 @@ impl PyChain {
         let index = self.body.site_index(name).map_err(raise)?;
         let site = &self.body.sites()[index];
         self.model.link_of(site.limb).map(|link| (link, site.position)).ok_or_else(|| {
-            let known = self.site_names().join(", ");
+            let known = self.site_links().map(|(name, _, _)| name).collect::<Vec<_>>().join(", ");
             BodyError::new_err(format!("site: expected one on the chain ({known}), found {name:?}"))
         })
     }
@@ -111,24 +111,11 @@ impl PyChain {
         Ok(Self { body: body.0.clone(), model })
     }
 
-    #[getter]
-    fn angle_names(&self) -> Vec<String> {
-        self.model.names().to_vec()
-    }
-
-    #[getter]
-    fn limits(&self) -> Vec<[f64; 2]> {
-        self.model.limits().to_vec()
-    }
-
-    #[getter]
-    fn limb_names(&self) -> Vec<String> {
-        self.model.links().iter().map(|link| self.body.limbs()[link.limb].name.clone()).collect()
-    }
-
-    #[getter]
-    fn site_names(&self) -> Vec<String> {
-        self.site_links().map(|(name, _, _)| name.to_owned()).collect()
+    /// Names and limits of the angles, names of the limbs, and names of the sites.
+    fn parts(&self) -> (Vec<String>, Vec<[f64; 2]>, Vec<String>, Vec<String>) {
+        let limbs = self.model.links().iter().map(|link| self.body.limbs()[link.limb].name.clone());
+        let sites = self.site_links().map(|(name, _, _)| name.to_owned());
+        (self.model.names().to_vec(), self.model.limits().to_vec(), limbs.collect(), sites.collect())
     }
 
     /// Poses `(P, 4, 4)` of the limbs and positions `(S, 3)` of the sites.
