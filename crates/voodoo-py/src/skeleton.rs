@@ -95,12 +95,6 @@ pub(crate) fn placed_frames(turns: &[Mat3], points: &[Vec3], plan: &[[i64; 4]]) 
     Some((found.into_iter().map(|(_, place)| place).collect(), rows))
 }
 
-/// The body of each frame: the only one, or one of each.
-fn each<'a>(bodies: &'a [PyRef<'_, PyBody>]) -> impl Iterator<Item = &'a Body> {
-    let again = bodies.iter().cycle().take(if bodies.len() == 1 { usize::MAX } else { bodies.len() });
-    again.map(|body| &body.0)
-}
-
 pub(crate) fn angles(turns: &[Mat3], plan: &[[i64; 8]]) -> Option<Vec<f64>> {
     let wrapped = |angle: f64| (angle + PI).rem_euclid(2.0 * PI) - PI;
     let mut last: Option<(&[i64], [f64; 3])> = None;
@@ -156,21 +150,21 @@ pub(crate) fn cylinder(Limb { shape, .. }: &Limb, &(turn, at): &(Mat3, Vec3)) ->
 #[pyfunction]
 pub(crate) fn skeleton<'py>(
     py: Python<'py>,
-    bodies: Vec<PyRef<'py, PyBody>>,
+    body: &PyBody,
     poses: Given<'py>,
     joints: Given<'py>,
     own: Plan<'py>,
 ) -> PyResult<(Array<'py>, Array<'py>)> {
     let (poses, joints, own) = (frames("poses", &poses)?, frames("joints", &joints)?, plan(&own)?);
     let (mut turns, mut heads) = (Vec::new(), Vec::new());
-    for ((poses, joints), body) in poses.iter().zip(&joints).zip(each(&bodies)) {
+    for (poses, joints) in poses.iter().zip(&joints) {
         let poses: Vec<_> = poses.iter().map(parts).collect();
         let joints: Vec<_> = joints.iter().copied().map(Vec3::from_array).collect();
-        let found = bones(body, &poses, &joints, own).ok_or_else(unplanned)?;
+        let found = bones(&body.0, &poses, &joints, own).ok_or_else(unplanned)?;
         turns.extend(found.0.iter().flat_map(rows_of));
         heads.extend(found.1.iter().flat_map(Vec3::to_array));
     }
-    let (count, limbs) = (poses.len(), bodies.first().map_or(0, |body| body.0.limbs().len()));
+    let (count, limbs) = (poses.len(), body.0.limbs().len());
     Ok((array(py, turns, &[count, limbs, 3, 3])?, array(py, heads, &[count, limbs, 3])?))
 }
 
@@ -228,18 +222,13 @@ pub(crate) fn moved_covariances<'py>(
 
 #[doc = stub!("cylinders")]
 #[pyfunction]
-pub(crate) fn cylinders<'py>(
-    py: Python<'py>,
-    bodies: Vec<PyRef<'py, PyBody>>,
-    poses: Given<'py>,
-) -> PyResult<Array<'py>> {
-    let poses = frames("poses", &poses)?;
-    let limbs = bodies.first().map_or(0, |body| body.0.limbs().len());
+pub(crate) fn cylinders<'py>(py: Python<'py>, body: &PyBody, poses: Given<'py>) -> PyResult<Array<'py>> {
+    let (poses, limbs) = (frames("poses", &poses)?, body.0.limbs());
     let mut rows = Vec::new();
-    for (poses, body) in poses.iter().zip(each(&bodies)) {
-        rows.extend(body.limbs().iter().zip(*poses).flat_map(|(limb, pose)| cylinder(limb, &parts(pose))));
+    for poses in &poses {
+        rows.extend(limbs.iter().zip(*poses).flat_map(|(limb, pose)| cylinder(limb, &parts(pose))));
     }
-    array(py, rows, &[poses.len(), limbs * 12])
+    array(py, rows, &[poses.len(), limbs.len() * 12])
 }
 
 /// The leading axes of an array that ends with the given ones.

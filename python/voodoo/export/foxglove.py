@@ -122,16 +122,16 @@ class Channels:
         return template(encode, ends[-1], stamp=_timestamp(*divmod(STAMP_NS, 1_000_000_000)))
 
 
-def shapes_of(bodies: Sequence[Body], limb_poses: FloatArray, joints: FloatArray) -> FloatArray:
+def shapes_of(body: Body, limb_poses: FloatArray, joints: FloatArray) -> FloatArray:
     """Numbers of the shapes (F, 12 L + 3 J): of each limb's cylinder middle, rotation, size, and scales of both ends; joints.
 
     Args:
-        bodies: one, or one of each of the F poses.
+        body: in the sizes that it has in all of the F poses.
         limb_poses: (F, L, 4, 4).
         joints: (F, J, 3).
     """
     poses = np.ascontiguousarray(limb_poses, dtype=np.float64)
-    cylinders = _core.cylinders([body.core for body in bodies], poses)
+    cylinders = _core.cylinders(body.core, poses)
     return np.concatenate([cylinders, joints.reshape(len(joints), 3 * joints.shape[1])], axis=1)
 
 
@@ -173,7 +173,7 @@ def write_foxglove(
         track, root = upright(track, root_frame, turn)
         found = track.of_frames(track.found)
         placed = human_frames(track.joint_names, found.joints, skeleton(found, body))
-        shapes = shapes_of([body], found.world_from_limb, found.joints)
+        shapes = shapes_of(body, found.world_from_limb, found.joints)
         width = 7 * len(placed.names) + shapes.shape[1]
         about = placed.names, placed.parents, track.limb_names, len(track.joint_names), width
         rows = zip(placed.on_parents, shapes, strict=True)

@@ -33,7 +33,7 @@ def urdf(body: Body, person: str) -> str:
     estimate = Tracker(body, detector=None).reset_pose(rest)
     names, limb_names = estimate.joint_names, estimate.limb_names
     joints_at_rest = estimate.joint_positions[None]
-    posed = skeleton_of([body], np.zeros(1), estimate.limb_poses[None], names, joints_at_rest)
+    posed = skeleton_of(body, np.zeros(1), estimate.limb_poses[None], names, joints_at_rest)
     frames = human_frames(names, joints_at_rest, posed)
     ids, places = [f"{name}_{person}" for name in frames.names], frames.places[0]
     joints: dict[str, list[tuple[str, npt.NDArray[np.float64]]]] = {}
