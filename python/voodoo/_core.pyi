@@ -33,16 +33,12 @@ __all__ = [
     "body_before",
     "carried",
     "config_fields",
-    "cylinders",
     "euler_angles",
     "expected_sites",
-    "joint_angles",
     "linear_sum_assignment",
-    "moved_covariances",
     "nearest_surface",
     "people_text",
     "person_candidates",
-    "placed",
     "quaternions",
     "render_depth",
     "skeleton",
@@ -290,18 +286,22 @@ class Template:
 
 @final
 class Layout:
-    """Finds everything that live outputs tell of a person, as one row of numbers.
+    """Finds everything that live outputs and files tell of a person, as one row of numbers.
 
-    Of L limbs, J joints, N frames and A angles: N times place and rotation x, y, z, w as of `placed`; L times 12 numbers as of
-    `cylinders`; J joints; L times head and rotation of a bone; A angles; the covariance (6, 6) of the first frame; and L times
-    place and rotation of a limb on its parent, with the axes of Unity (left-handed: left is -X, up Y, ahead Z).
+    Of L limbs, J joints, N frames and A angles: N times place x, y, z and rotation x, y, z, w on the parent; L times middle,
+    rotation, both diameters, length, and scales of both ends of a limb's cylinder (12 numbers); J joints; L times head and
+    rotation of a bone; A angles [rad]; the covariance (6, 6) of the first frame; and L times place and rotation of a limb on its
+    parent, with the axes of Unity (left-handed: left is -X, up Y, ahead Z).
 
     Args:
         own: as of `skeleton`.
-        frames: plan as of `placed`, of heads and joints.
-        angles: plan as of `joint_angles`.
+        frames: of each frame (4) the bone with which it turns, two points (heads of bones, then joints) in the middle of which it
+            is, and its parent among the frames, or -1.
+        angles: of each angle (8) the numbers of the bone above and of the other; the three moving axes of Euler angles (0, 1, 2:
+            x, y, z), or -1 for the twist about y; which of the three angles it is; its sign; and whether half a turn is added
+            before.
         arms: turns (1, L, 3, 3) from limbs at rest to those of Unity.
-        limbs: plan as of `placed`, of heads.
+        limbs: as `frames`, of heads.
     """
 
     def __new__(
@@ -312,6 +312,15 @@ class Layout:
         arms: npt.NDArray[np.float64],
         limbs: npt.NDArray[np.int64],
     ) -> Layout: ...
+    def rows_of_frames(
+        self,
+        body: Body,
+        poses: npt.NDArray[np.float64],
+        joints: npt.NDArray[np.float64],
+        covariances: npt.NDArray[np.float64],
+    ) -> npt.NDArray[np.float64]:
+        """The rows (F, ...) of poses (F, L, 4, 4) of a body, with joints (F, J, 3) and covariances (F, 6, 6) of the first limb."""
+
     def rows(
         self, estimates: Sequence[Estimate], bodies: Sequence[Body], turn: npt.NDArray[np.float64] | None
     ) -> tuple[npt.NDArray[np.float64], list[bool]]:
@@ -343,35 +352,6 @@ def skeleton(
 
     Rows of `own` are limbs whose joint to the parent is one of joints (F, J, 3), and the number of that.
     """
-
-def placed(
-    rotations: npt.NDArray[np.float64],
-    points: npt.NDArray[np.float64],
-    plan: npt.NDArray[np.int64],
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Places (F, N, 3) of frames; and place and rotation x, y, z, w (F, N, 7) of each on its parent.
-
-    Rows (4) of `plan` are, of each frame, the number of its rotation among (F, L, 3, 3), those of two points among (F, M, 3) in
-    the middle of which it is, and that of its parent among the frames or -1.
-    """
-
-def joint_angles(
-    rotations: npt.NDArray[np.float64],
-    plan: npt.NDArray[np.int64],
-) -> npt.NDArray[np.float64]:
-    """Angles (F, N) [rad] between two of the rotations (F, L, 3, 3) each.
-
-    Rows (8) of `plan` are, of each angle, the numbers of the rotation above and of the other; the three moving axes of Euler
-    angles (0, 1, 2: x, y, z), or -1 for the twist about y; which of the three angles it is; its sign; and whether half a turn is
-    added before.
-    """
-
-def moved_covariances(covariances: npt.NDArray[np.float64], across: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Covariances (F, 6, 6) of poses of points that are away by (F, 3) from those whose covariances are given."""
-
-def cylinders(body: Body, poses: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Of poses (F, L, 4, 4) of a body: middle, rotation x, y, z, w, both diameters, length, and scales of both ends of each limb's
-    cylinder (F, 12 L)."""
 
 def carried(
     points: _Points,

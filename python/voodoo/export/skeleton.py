@@ -116,10 +116,19 @@ def skeleton(track: Track, body: Body) -> Skeleton:
     Raises:
         VoodooError: the track has no limb poses (it was read from a .csv), or is of another body.
     """
+    check_limbs(track, body)
+    return skeleton_of(body, track.stamps, track.world_from_limb, track.joint_names, track.joints)
+
+
+def check_limbs(track: Track, body: Body) -> None:
+    """Check that a track has poses of the limbs of a body.
+
+    Raises:
+        VoodooError: it has none (it was read from a .csv), or those of another body.
+    """
     if track.limb_names != body.limb_names:
         found = ", ".join(track.limb_names) or "none (a .csv has no limb poses; use .npz)"
         raise VoodooError(f"track: expected poses of the limbs {', '.join(body.limb_names)}, found {found}")
-    return skeleton_of(body, track.stamps, track.world_from_limb, track.joint_names, track.joints)
 
 
 def skeleton_of(
