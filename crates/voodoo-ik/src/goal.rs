@@ -81,7 +81,7 @@ pub fn level_rows(
         let root = goal.weight.sqrt();
         residual.extend((root * goal.aim.residual(x)).to_array());
         let rows = &mut jacobian[3 * index * n..3 * (index + 1) * n];
-        for &mover in &model.movers[goal.link] {
+        for &mover in &model.links()[goal.link].movers {
             let column = &at.columns[mover];
             let d = root * goal.aim.derivative(column.omega.cross(x) + column.v);
             rows[mover] = d.x;

@@ -41,16 +41,16 @@ pub struct Link {
     pub turn: Turn,
     /// Its first unknown.
     pub start: usize,
+    /// The unknowns that move it.
+    pub(super) movers: Vec<usize>,
 }
 
 /// The chain: everything that stays constant while it moves.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ChainModel {
     links: Vec<Link>,
     names: Vec<String>,
     limits: Vec<[f64; 2]>,
-    /// For every link, the unknowns that move it.
-    pub(super) movers: Vec<Vec<usize>>,
 }
 
 /// Derivative of the world position of a point `x` on any limb distal to the joint: `omega x x + v` for a unit rate of the
@@ -80,7 +80,7 @@ impl ChainModel {
         let mut chosen = if limbs.is_empty() { all } else { limbs.to_vec() };
         chosen.sort_unstable();
         chosen.dedup();
-        let mut model = Self { links: Vec::new(), names: Vec::new(), limits: Vec::new(), movers: Vec::new() };
+        let mut model = Self::default();
         for limb in chosen {
             let Some(description) = body.limbs().get(limb) else {
                 return Err(BodyError::value("limbs", "indices of limbs", limb.to_string()));
@@ -121,10 +121,9 @@ impl ChainModel {
                 }
             }
         };
-        let mut movers = parent.map_or_else(Vec::new, |parent| self.movers[parent].clone());
+        let mut movers = parent.map_or_else(Vec::new, |parent| self.links[parent].movers.clone());
         movers.extend(start..self.names.len());
-        self.movers.push(movers);
-        self.links.push(Link { limb, parent, parent_from_joint, joint_from_limb, turn, start });
+        self.links.push(Link { limb, parent, parent_from_joint, joint_from_limb, turn, start, movers });
         Ok(())
     }
 
