@@ -53,10 +53,6 @@ pub(crate) fn rotation(rows: &[f64; 9]) -> Mat3 {
     Mat3::from_cols_array(rows).transpose()
 }
 
-fn rows_of(rotation: &Mat3) -> [f64; 9] {
-    rotation.transpose().to_cols_array()
-}
-
 pub(crate) fn poses_of(rows: &[[f64; 16]]) -> Vec<(Mat3, Vec3)> {
     rows.iter().map(parts).collect()
 }
@@ -167,7 +163,7 @@ pub(crate) fn skeleton<'py>(
     for (poses, joints) in poses.iter().zip(&joints) {
         let (poses, joints) = (poses_of(poses), points_of(joints));
         let found = bones(&body.0, &poses, &joints, own).ok_or_else(unplanned)?;
-        turns.extend(found.0.iter().flat_map(rows_of));
+        turns.extend(found.0.iter().flat_map(|turn| turn.transpose().to_cols_array()));
         heads.extend(found.1.iter().flat_map(Vec3::to_array));
     }
     let (count, limbs) = (poses.len(), body.0.limbs().len());
@@ -188,7 +184,7 @@ pub(crate) fn quaternions<'py>(py: Python<'py>, rotations: Given<'py>) -> PyResu
     let shape = [leading(&rotations, &[3, 3])?, &[4]].concat();
     let (mut found, mut skewed) = (Vec::with_capacity(shape.iter().product()), false);
     for rows in rotations.as_slice()?.as_chunks::<9>().0 {
-        let matrix = Mat3::from_cols_array(rows).transpose();
+        let matrix = rotation(rows);
         found.extend(math::quaternion(&matrix));
         skewed |= math::is_skewed(&matrix);
     }
