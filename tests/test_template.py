@@ -61,7 +61,7 @@ def test_plans_and_arrays_that_do_not_fit_are_refused():
         _core.skeleton(body.core, poses.swapaxes(2, 3), joints, own)
     with pytest.raises(MeasurementError, match="plan: expected 2 columns, found 4"):
         _core.skeleton(body.core, poses, joints, np.zeros((1, 4), dtype=np.int64))
-    frame, angle, arms = np.array([[0, 1, 0, -1]]), np.array([[0, 1, 2, 1, 0, 0, 1, 0]]), np.tile(np.eye(3), (1, 1, 1, 1))
+    frame, angle, arms = np.array([[0, 1, 0, -1]]), np.array([[0, 1, 2, 1, 0, 0, 1, 0]]), np.eye(3)[None, None]
     given = body.core, poses, joints, np.zeros((2, 6, 6))
     assert _core.Layout(own, frame, angle, arms, frame).rows_of_frames(*given).shape[0] == 2
     for frames, angles in ((frame, np.array([[0, 1, 2, 2, 0, 0, 1, 0]])), (np.array([[0, 99, 0, -1]]), angle)):

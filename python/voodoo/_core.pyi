@@ -319,7 +319,7 @@ class Layout:
         joints: npt.NDArray[np.float64],
         covariances: npt.NDArray[np.float64],
     ) -> npt.NDArray[np.float64]:
-        """The rows (F, ...) of poses (F, L, 4, 4) of a body, with joints (F, J, 3) and covariances (F, 6, 6) of the first limb."""
+        """The rows (F, ...) of poses (F, L, 4, 4) of a body: joints (F, J, 3), covariances (F, 6, 6) of the first limb."""
 
     def rows(
         self, estimates: Sequence[Estimate], bodies: Sequence[Body], turn: npt.NDArray[np.float64] | None

@@ -26,9 +26,9 @@ def placed_names(names: Sequence[str], parents: Sequence[int], person: str, root
 def frame_plan(
     joint_names: tuple[str, ...], limbs: tuple[tuple[str, int | None], ...]
 ) -> tuple[tuple[str, ...], tuple[int, ...], npt.NDArray[np.int64]]:
-    """Of each frame the name, without that of the person, and the parent, -1 of the first one, which is on the root frame; and the
-    plan of `_core.Layout`: the limb it turns with, two points in the middle of which it is (heads of limbs, then joints), and the
-    parent."""
+    """Of each frame the name without that of the person; the parent, -1 of the first one, which is on the root frame; and the row
+    of the plan of `_core.Layout`: the limb it turns with, two points in the middle of which it is (heads of limbs, then joints),
+    and the parent."""
     sites = {name: len(limbs) + index for index, name in enumerate(joint_names)}
     there = {name for name, _ in limbs}
 

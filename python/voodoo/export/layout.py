@@ -53,6 +53,7 @@ class Layout:
 
 @lru_cache(maxsize=64)
 def layout_of(joints: tuple[str, ...], limbs: _Limbs, limb_joints: tuple[str | None, ...]) -> Layout:
+    """The layout for names of joints and sites, `Body.limb_tree` and `Body.limb_joints`."""
     limb_names = tuple(limb for limb, _ in limbs)
     (names, parents, frames), (angles, turns) = frame_plan(joints, limbs), angle_plan(limb_names)
     quarter = {"l": matrix_of_turn((-_TURN, 0.0, 0.0)), "r": matrix_of_turn((_TURN, 0.0, 0.0))}

@@ -16,6 +16,7 @@ from voodoo.export.skeleton import FloatArray
 from voodoo.export.upright import SUFFIX, Turn, by_axes
 from voodoo.live.follow import Step
 
+
 class Shown(NamedTuple):
     """Persons P of a step who have a pose.
 
