@@ -183,7 +183,6 @@ class KeypointLayout:
         noise: float,
         place_sigma: float,
         least: float,
-        only: Sequence[str] | None,
         gate: SiteGate | None,
         surface: Callable[[tuple[float, float]], float | None] | None,
         before: Mapping[str, float] | None,
