@@ -1,7 +1,5 @@
 //! Targets of sites: a position, or a line of sight.
 
-use std::ops::Range;
-
 use super::model::{ChainModel, Kinematics};
 use voodoo_core::math::{Vec3, reset};
 
@@ -88,14 +86,5 @@ pub fn level_rows(
             rows[n + mover] = d.y;
             rows[2 * n + mover] = d.z;
         }
-    }
-}
-
-/// The ranges of equal levels in goals sorted by level.
-pub(super) fn level_ranges(goals: &[Goal], ranges: &mut Vec<Range<usize>>) {
-    ranges.clear();
-    for same in goals.chunk_by(|a, b| a.level == b.level) {
-        let start = ranges.last().map_or(0, |before: &Range<usize>| before.end);
-        ranges.push(start..start + same.len());
     }
 }

@@ -7,7 +7,7 @@ mod step;
 
 use std::ops::Range;
 
-use super::goal::{Goal, level_cost, level_ranges};
+use super::goal::{Goal, level_cost};
 use super::image::Criterion;
 use super::linear::{Damped, Taken};
 use super::model::{ChainModel, Kinematics};
@@ -255,7 +255,11 @@ impl IkSolver {
             *angle = angle.clamp(*low, *high);
         }
         problem.model.normalize(angles);
-        level_ranges(problem.goals, &mut self.levels.ranges);
+        self.levels.ranges.clear();
+        for same in problem.goals.chunk_by(|a, b| a.level == b.level) {
+            let start = self.levels.ranges.last().map_or(0, |before| before.end);
+            self.levels.ranges.push(start..start + same.len());
+        }
         let count = self.levels.ranges.len();
         reset(&mut self.levels.trust, count, 0.1);
         reset(&mut self.levels.before, count, 0.0);
