@@ -17,6 +17,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,7 @@ from voodoo.live.session import Output, Session
 from voodoo.live.sinks import sink_of
 from voodoo.live.sources.played import PlayedSource
 from voodoo.live.stream import Live
-from voodoo.measurements import ColorImage, RecordedFrame
+from voodoo.measurements import ColorImage, Measurement, RecordedFrame
 from voodoo.sensors.settings import FrontEndSettings
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
@@ -59,6 +60,14 @@ with c.connect(sys.argv[1], subprotocols=["foxglove.sdk.v1"] if sys.argv[2:] els
 """
 
 
+def painted(item: Measurement) -> Measurement:
+    """The measurement; a color image, of which a live source makes copies that decode it anew, has been painted."""
+    if not isinstance(item, ColorImage):
+        return item
+    image = item.image
+    return replace(item, decode=lambda: image)
+
+
 class Kept(MadeUpRecording):
     """Images are painted once, as a camera's driver would take no time for them from the tracker.
 
@@ -68,10 +77,9 @@ class Kept(MadeUpRecording):
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
-        self._kept, self.used = list(super().__iter__()), list[float]()
-        for frame in self._kept:
-            for item in frame.measurements:
-                _ = item.image if isinstance(item, ColorImage) else None  # it keeps what it has decoded
+        self._kept, self.used = list[RecordedFrame](), list[float]()
+        for frame in super().__iter__():
+            self._kept.append(replace(frame, measurements=tuple(map(painted, frame.measurements))))
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         self.used = []

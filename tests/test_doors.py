@@ -19,7 +19,7 @@ from browser import needs_chromium, told_by
 from test_exports import read_bvh, with_gaps
 from voodoo.export.conventions import NAMES, names_of
 from voodoo.export.files import save
-from voodoo.export.human_frames import joint_angles
+from voodoo.export.layout import rows_of
 from voodoo.export.people import PeopleTrack
 from voodoo.export.skeleton import bones, skeleton
 from voodoo.export.track import Track
@@ -192,8 +192,8 @@ def test_every_format_puts_the_joints_in_the_same_place(tmp_path, person):
             assert np.abs(heads[bone.name] - expected[bone.name][frame]).max() < 1e-4, bone.name
     # JointState has the angles of human_description; those of shoulder and hip are the whole rotation.
     posed = skeleton(track, body)
-    names, angles = joint_angles(posed)
-    angle = dict(zip(names, angles.T, strict=True))
+    layout, rows = rows_of(track, body)
+    angle = dict(zip(layout.angles, layout.parts(rows)[4].T, strict=True))
     index = {bone.name: number for number, bone in enumerate(posed.bones)}
     for side, s in (("l", 1.0), ("r", -1.0)):
         thigh, calf = index[f"{side}_thigh"], index[f"{side}_calf"]

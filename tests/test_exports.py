@@ -28,7 +28,8 @@ from voodoo.export import (
     write_trc,
 )
 from voodoo.export.files import check_target, save
-from voodoo.export.human_frames import human_frames, joint_angles
+from voodoo.export.human_frames import frame_places, frame_plan
+from voodoo.export.layout import rows_of
 from voodoo.export.skeleton import skeleton
 from voodoo.export.track import Track
 from voodoo.export.upright import by_axes, by_feet, by_floor, lying_words, turned
@@ -172,8 +173,8 @@ def test_bvh_at_rest_has_zero_rotations(tmp_path, tracked):
 
 def test_joint_angles_have_the_signs_of_human_description(tracked):
     track, body = tracked
-    names, angles = joint_angles(skeleton(track, body))
-    angle = {name: angles[:, index] for index, name in enumerate(names)}
+    layout, rows = rows_of(track, body)
+    angle = dict(zip(layout.angles, layout.parts(rows)[4].T, strict=True))
     assert angle["l_elbow"][1] == pytest.approx(np.pi / 2, abs=0.1)  # flexed forwards
     assert angle["r_p_shoulder"][1] == pytest.approx(np.pi / 2, abs=0.1)  # abducted
     assert angle["l_knee"][2] == pytest.approx(-np.pi / 2, abs=0.1)
@@ -521,10 +522,11 @@ def test_all_formats_report_the_same_joints(tmp_path, recorded):
         "r_ankle": "r_ankle",
         "l_shoulder": "l_shoulder",
     }
-    frames = human_frames(track.joint_names, track.joints, skeleton(track, body))
+    frames, _, plan = frame_plan(track.joint_names, body.limb_tree)
+    places = frame_places(plan, skeleton(track, body).heads, track.joints)
     for row in (0, 45, 89):
         for frame, joint in names.items():
-            place = frames.places[row, frames.names.index(frame)]
+            place = places[row, frames.index(frame)]
             assert np.abs(place - track.joints[row, track.joint_names.index(joint)]).max() < 1e-9, frame
 
 

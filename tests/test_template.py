@@ -52,16 +52,20 @@ def test_plans_and_arrays_that_do_not_fit_are_refused():
     body = voodoo.Body.human()
     poses, joints = np.tile(np.eye(4), (2, len(body.limbs), 1, 1)), np.zeros((2, 5, 3))
     own = np.array([[1, 4]])
-    turns, heads = _core.skeleton([body.core], poses, joints, own)
+    turns, heads = _core.skeleton(body.core, poses, joints, own)
     assert turns.shape == (2, len(body.limbs), 3, 3) and (heads[:, 1] == 0.0).all()
     for wrong in (np.array([[1, 5]]), np.array([[len(body.limbs), 0]]), np.array([[-1, 0]])):
         with pytest.raises(MeasurementError, match="plan"):
-            _core.skeleton([body.core], poses, joints, wrong)
+            _core.skeleton(body.core, poses, joints, wrong)
     with pytest.raises(MeasurementError, match="contiguous frames of rows of 16 numbers"):
-        _core.skeleton([body.core], poses.swapaxes(2, 3), joints, own)
+        _core.skeleton(body.core, poses.swapaxes(2, 3), joints, own)
     with pytest.raises(MeasurementError, match="plan: expected 2 columns, found 4"):
-        _core.skeleton([body.core], poses, joints, np.zeros((1, 4), dtype=np.int64))
+        _core.skeleton(body.core, poses, joints, np.zeros((1, 4), dtype=np.int64))
+    frame, angle, arms = np.array([[0, 1, 0, -1]]), np.array([[0, 1, 2, 1, 0, 0, 1, 0]]), np.eye(3)[None, None]
+    given = body.core, poses, joints, np.zeros((2, 6, 6))
+    assert _core.Layout(own, frame, angle, arms, frame).rows_of_frames(*given).shape[0] == 2
+    for frames, angles in ((frame, np.array([[0, 1, 2, 2, 0, 0, 1, 0]])), (np.array([[0, 99, 0, -1]]), angle)):
+        with pytest.raises(MeasurementError, match="plan"):  # no Euler angles, and no such point
+            _core.Layout(own, frames, angles, arms, frame).rows_of_frames(*given)
     with pytest.raises(MeasurementError, match="plan"):
-        _core.joint_angles(turns, np.array([[0, 1, 2, 2, 0, 0, 1, 0]]))  # no Euler angles
-    with pytest.raises(MeasurementError, match="plan"):
-        _core.placed(turns, heads, np.array([[0, 99, 0, -1]]))
+        _core.Layout(own, frame, angle, arms, frame).rows_of_frames(*given[:3], np.zeros((2, 5, 6)))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from lab.training.anybody import GROUPS, THINGS
 from lab.training.scenes import Frame, Person
 from voodoo import Camera, _core
+from voodoo.detectors.base import PersonCandidate
 
 Array = NDArray[np.float64]
 PERSON_FRACTION = (0.1, 0.45)  # of a candidate's pixels: below the first it is nobody, above the second somebody
@@ -71,7 +72,7 @@ def samples(frame: Frame, rng: np.random.Generator, most: int = 2) -> list[Sampl
     counts = {p.label: int((frame.labels == p.label).sum()) for p in frame.people}
     group = GROUPS.index(frame.group)
 
-    def shown(i: int, factor: float, often: float) -> tuple[_core.PersonCandidate, float]:
+    def shown(i: int, factor: float, often: float) -> tuple[PersonCandidate, float]:
         if factor * SMALL < 1 or rng.random() > often:
             return found[i], 1.0
         return _core.person_candidates(frame.depth, camera=camera, up=up, floor=floor, enlarged=factor)[i], factor
@@ -103,7 +104,7 @@ def samples(frame: Frame, rng: np.random.Generator, most: int = 2) -> list[Sampl
 
 
 def _sample(
-    shown: tuple[_core.PersonCandidate, float],
+    shown: tuple[PersonCandidate, float],
     person: Person | None,
     fraction: float,
     cover: float,

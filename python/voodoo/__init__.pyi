@@ -2,13 +2,13 @@ from typing import Any
 
 from voodoo import ik as ik
 from voodoo._core import ClosestPoints as ClosestPoints
-from voodoo._core import Detection as Detection
 from voodoo._core import Detector as Detector
 from voodoo._core import Estimate as Estimate
 from voodoo._core import Frame as Frame
 from voodoo._core import TaperedEllipticCylinder as TaperedEllipticCylinder
 from voodoo._core import __version__ as __version__
 from voodoo.config import Config as Config
+from voodoo.detectors.base import Detection as Detection
 from voodoo.errors import BodyError as BodyError
 from voodoo.errors import CameraError as CameraError
 from voodoo.errors import ConfigError as ConfigError

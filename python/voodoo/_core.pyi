@@ -7,19 +7,19 @@ from typing import Any, ClassVar, Protocol, final
 import numpy as np
 import numpy.typing as npt
 
+from voodoo.detectors.base import Detection, PersonCandidate
+
 __all__ = [
     "Body",
     "Camera",
     "Chain",
     "ClosestPoints",
-    "Detection",
     "Detector",
     "Estimate",
     "Frame",
     "KeypointLayout",
     "Layout",
     "People",
-    "PersonCandidate",
     "SiteGate",
     "SiteRay",
     "SkinCue",
@@ -33,16 +33,12 @@ __all__ = [
     "body_before",
     "carried",
     "config_fields",
-    "cylinders",
     "euler_angles",
     "expected_sites",
-    "joint_angles",
     "linear_sum_assignment",
-    "moved_covariances",
     "nearest_surface",
     "people_text",
     "person_candidates",
-    "placed",
     "quaternions",
     "render_depth",
     "skeleton",
@@ -187,7 +183,6 @@ class KeypointLayout:
         noise: float,
         place_sigma: float,
         least: float,
-        only: Sequence[str] | None,
         gate: SiteGate | None,
         surface: Callable[[tuple[float, float]], float | None] | None,
         before: Mapping[str, float] | None,
@@ -290,18 +285,22 @@ class Template:
 
 @final
 class Layout:
-    """Finds everything that live outputs tell of a person, as one row of numbers.
+    """Finds everything that live outputs and files tell of a person, as one row of numbers.
 
-    Of L limbs, J joints, N frames and A angles: N times place and rotation x, y, z, w as of `placed`; L times 12 numbers as of
-    `cylinders`; J joints; L times head and rotation of a bone; A angles; the covariance (6, 6) of the first frame; and L times
-    place and rotation of a limb on its parent, with the axes of Unity (left-handed: left is -X, up Y, ahead Z).
+    Of L limbs, J joints, N frames and A angles: N times place x, y, z and rotation x, y, z, w on the parent; L times middle,
+    rotation, both diameters, length, and scales of both ends of a limb's cylinder (12 numbers); J joints; L times head and
+    rotation of a bone; A angles [rad]; the covariance (6, 6) of the first frame; and L times place and rotation of a limb on its
+    parent, with the axes of Unity (left-handed: left is -X, up Y, ahead Z).
 
     Args:
         own: as of `skeleton`.
-        frames: plan as of `placed`, of heads and joints.
-        angles: plan as of `joint_angles`.
+        frames: of each frame (4) the bone with which it turns, two points (heads of bones, then joints) in the middle of which it
+            is, and its parent among the frames, or -1.
+        angles: of each angle (8) the numbers of the bone above and of the other; the three moving axes of Euler angles (0, 1, 2:
+            x, y, z), or -1 for the twist about y; which of the three angles it is; its sign; and whether half a turn is added
+            before.
         arms: turns (1, L, 3, 3) from limbs at rest to those of Unity.
-        limbs: plan as of `placed`, of heads.
+        limbs: as `frames`, of heads.
     """
 
     def __new__(
@@ -312,6 +311,15 @@ class Layout:
         arms: npt.NDArray[np.float64],
         limbs: npt.NDArray[np.int64],
     ) -> Layout: ...
+    def rows_of_frames(
+        self,
+        body: Body,
+        poses: npt.NDArray[np.float64],
+        joints: npt.NDArray[np.float64],
+        covariances: npt.NDArray[np.float64],
+    ) -> npt.NDArray[np.float64]:
+        """The rows (F, ...) of poses (F, L, 4, 4) of a body: joints (F, J, 3), covariances (F, 6, 6) of the first limb."""
+
     def rows(
         self, estimates: Sequence[Estimate], bodies: Sequence[Body], turn: npt.NDArray[np.float64] | None
     ) -> tuple[npt.NDArray[np.float64], list[bool]]:
@@ -334,44 +342,15 @@ def euler_angles(quaternions: npt.NDArray[np.float64], order: tuple[int, int, in
     """
 
 def skeleton(
-    bodies: Sequence[Body],
+    body: Body,
     poses: npt.NDArray[np.float64],
     joints: npt.NDArray[np.float64],
     own: npt.NDArray[np.int64],
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Rotations world_from_bone (F, L, 3, 3) and heads (F, L, 3) of poses (F, L, 4, 4) of one body, or of one of each frame.
+    """Rotations world_from_bone (F, L, 3, 3) and heads (F, L, 3) of poses (F, L, 4, 4) of a body.
 
     Rows of `own` are limbs whose joint to the parent is one of joints (F, J, 3), and the number of that.
     """
-
-def placed(
-    rotations: npt.NDArray[np.float64],
-    points: npt.NDArray[np.float64],
-    plan: npt.NDArray[np.int64],
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Places (F, N, 3) of frames; and place and rotation x, y, z, w (F, N, 7) of each on its parent.
-
-    Rows (4) of `plan` are, of each frame, the number of its rotation among (F, L, 3, 3), those of two points among (F, M, 3) in
-    the middle of which it is, and that of its parent among the frames or -1.
-    """
-
-def joint_angles(
-    rotations: npt.NDArray[np.float64],
-    plan: npt.NDArray[np.int64],
-) -> npt.NDArray[np.float64]:
-    """Angles (F, N) [rad] between two of the rotations (F, L, 3, 3) each.
-
-    Rows (8) of `plan` are, of each angle, the numbers of the rotation above and of the other; the three moving axes of Euler
-    angles (0, 1, 2: x, y, z), or -1 for the twist about y; which of the three angles it is; its sign; and whether half a turn is
-    added before.
-    """
-
-def moved_covariances(covariances: npt.NDArray[np.float64], across: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Covariances (F, 6, 6) of poses of points that are away by (F, 3) from those whose covariances are given."""
-
-def cylinders(bodies: Sequence[Body], poses: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Of poses (F, L, 4, 4) of one body, or of one of each frame: middle, rotation x, y, z, w, both diameters, length, and scales
-    of both ends of each limb's cylinder (F, 12 L)."""
 
 def carried(
     points: _Points,
@@ -669,26 +648,6 @@ class Frame:
             MeasurementError: not three numbers; the step rejects corners that are not finite or in the wrong order.
         """
 
-@final
-class PersonCandidate:
-    """A person candidate in a depth image, with the crop that is the network's input. Camera frame, meters."""
-
-    @property
-    def crop(self) -> npt.NDArray[np.float32]:
-        """Input of the network (2, 96, 96): depth relative to the center, scaled so that +-1.2 m is +-1, and the mask."""
-    @property
-    def mask(self) -> npt.NDArray[np.bool_]:
-        """Its pixels (H, W) in the depth image."""
-    @property
-    def middle(self) -> tuple[float, float, float]:
-        """Center of the crop: (x/z, y/z) in the camera rotated by `roll`, and the depth [m]."""
-    @property
-    def roll(self) -> float:
-        """Rotation of the camera about its optical axis that makes the vertical point up in the image [rad]."""
-    @property
-    def floor(self) -> tuple[tuple[float, float, float], float] | None:
-        """Normal and offset of the ground plane, given or detected."""
-
 def person_candidates(
     depth: npt.NDArray[np.float32],
     *,
@@ -745,44 +704,6 @@ class Detector:
         Raises:
             MeasurementError: a measurement that cannot be used.
         """
-
-@final
-class Detection:
-    """A person in a depth image. World frame, meters."""
-
-    @property
-    def joints(self) -> dict[str, npt.NDArray[np.float64]]:
-        """Joint name -> position (3,) [m]; `l_` and `r_` are the person's own."""
-    @property
-    def joint_sigma(self) -> dict[str, float]:
-        """Joint name -> standard deviation along each axis [m]."""
-    @property
-    def visible(self) -> dict[str, float]:
-        """Joint name -> probability that it is in the image and not occluded."""
-    @property
-    def lengths(self) -> dict[str, float]:
-        """Upper arm, forearm, thigh, shank, shoulder and hip width, trunk, neck and stature [m]."""
-    @property
-    def length_sigma(self) -> dict[str, float]:
-        """Names as in `lengths` -> standard deviation [m]."""
-    @property
-    def stature(self) -> float:
-        """Height of the person when standing upright [m]."""
-    @property
-    def facing(self) -> float:
-        """Probability that the front of the trunk faces the camera."""
-    @property
-    def confidence(self) -> float:
-        """Probability that it is a person."""
-    @property
-    def source(self) -> str:
-        """Source name of the depth image in which it was detected."""
-    @property
-    def mask(self) -> npt.NDArray[np.bool_]:
-        """The person's pixels (H, W) in that image."""
-    @property
-    def floor(self) -> tuple[tuple[float, float, float], float] | None:
-        """Ground plane, detected or given by the frame: unit normal (3,) upwards and height along it [m]; or None."""
 
 @final
 class Estimate:
@@ -953,14 +874,7 @@ class Chain:
     """A kinematic chain of the core; use voodoo.ik.Chain."""
 
     def __new__(cls, body: Body, limbs: Sequence[str], free_root: bool) -> Chain: ...
-    @property
-    def angle_names(self) -> list[str]: ...
-    @property
-    def limits(self) -> list[list[float]]: ...
-    @property
-    def limb_names(self) -> list[str]: ...
-    @property
-    def site_names(self) -> list[str]: ...
+    def parts(self) -> tuple[list[str], list[list[float]], list[str], list[str]]: ...
     def forward(
         self, base: npt.ArrayLike, angles: npt.NDArray[np.float64]
     ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...

@@ -2,7 +2,7 @@
 
 use crate::view::ThinnedImage;
 use nalgebra::{Matrix3, Vector3};
-use voodoo_core::math::{Vec3, refill, reset, widest};
+use voodoo_core::math::{Aabb, Vec3, refill, reset, widest};
 
 /// Neighboring pixels are connected when their depths differ by less than this, meters, plus this fraction of the depth.
 const STEP: [f32; 2] = [0.04, 0.012];
@@ -38,8 +38,7 @@ const UP_BY_TWO: u8 = 8;
 struct Component {
     label: u32,
     area: f64,
-    low: Vec3,
-    high: Vec3,
+    bounds: Aabb,
     /// At most [`COMPONENT_SAMPLES`] of its points.
     samples: Vec<Vec3>,
     /// Number of points added so far; every `every`-th of them was kept.
@@ -49,13 +48,13 @@ struct Component {
 
 impl Component {
     fn new(label: u32, area: f64) -> Self {
-        Self { label, area, low: Vec3::INFINITY, high: Vec3::NEG_INFINITY, samples: Vec::new(), added: 0, every: 1 }
+        Self { label, area, bounds: Aabb::from_points([]), samples: Vec::new(), added: 0, every: 1 }
     }
 
     /// Adds a point; only every `every`-th is kept once there are many.
     fn add(&mut self, point: Vec3) {
-        self.low = self.low.min(point);
-        self.high = self.high.max(point);
+        self.bounds.mins = self.bounds.mins.min(point);
+        self.bounds.maxs = self.bounds.maxs.max(point);
         // `every` is a power of two, which avoids a division per pixel.
         if self.added & (self.every - 1) == 0 {
             if self.samples.len() == COMPONENT_SAMPLES {
@@ -76,10 +75,8 @@ pub struct PersonCandidate {
     pub(crate) labels: Vec<u32>,
     /// Visible surface area, square meters.
     pub area: f64,
-    /// Lower corner of its box, camera frame.
-    pub low: Vec3,
-    /// Upper corner.
-    pub high: Vec3,
+    /// Its box, camera frame.
+    pub bounds: Aabb,
 }
 
 impl PersonCandidate {
@@ -87,13 +84,8 @@ impl PersonCandidate {
     pub(crate) fn distance(&self, point: Vec3) -> f64 {
         /// A point within several boxes belongs to the one with the nearest center.
         const TO_MIDDLE: f64 = 0.1;
-        let outside = (self.low - point).max(point - self.high).max(Vec3::ZERO).length();
-        outside + TO_MIDDLE * point.distance(self.middle())
-    }
-
-    /// Center of its box, camera frame.
-    pub(crate) fn middle(&self) -> Vec3 {
-        0.5 * (self.low + self.high)
+        let outside = (self.bounds.mins - point).max(point - self.bounds.maxs).max(Vec3::ZERO).length();
+        outside + TO_MIDDLE * point.distance(self.bounds.center())
     }
 
     /// Whether a component is one of its.
@@ -309,15 +301,17 @@ impl Components {
     fn propose(&self, candidates: &mut Vec<PersonCandidate>) {
         for (number, part) in self.parts.iter().enumerate() {
             let large = (0.3 * AREA[0]..=AREA[1]).contains(&part.area);
-            if !large || is_flat(&part.samples, (part.high - part.low).max_element()) {
+            if !large || is_flat(&part.samples, longest_edge(&part.bounds)) {
                 continue;
             }
-            let alone = PersonCandidate { labels: vec![part.label], area: part.area, low: part.low, high: part.high };
+            let alone = PersonCandidate { labels: vec![part.label], area: part.area, bounds: part.bounds };
             let together = self.with_near_parts(number, alone.clone());
             for candidate in [alone, together] {
                 let within = |size: f64, [least, most]: [f64; 2]| least < size && size < most;
-                let length = (candidate.high - candidate.low).max_element();
-                if within(candidate.area, AREA) && within(length, LENGTH) && !candidates.contains(&candidate) {
+                if within(candidate.area, AREA)
+                    && within(longest_edge(&candidate.bounds), LENGTH)
+                    && !candidates.contains(&candidate)
+                {
                     candidates.push(candidate);
                 }
             }
@@ -336,12 +330,13 @@ impl Components {
                 if taken.contains(&number) || whole.area + other.area > AREA[1] {
                     continue;
                 }
-                let (low, high) = (whole.low.min(other.low), whole.high.max(other.high));
-                if (high - low).max_element() < LENGTH[1] && near(from, other) {
+                let [own, more] = [whole.bounds, other.bounds];
+                let bounds = Aabb::from_points([own.mins, own.maxs, more.mins, more.maxs]);
+                if longest_edge(&bounds) < LENGTH[1] && near(from, other) {
                     taken.push(number);
                     whole.labels.push(other.label);
                     whole.area += other.area;
-                    (whole.low, whole.high) = (low, high);
+                    whole.bounds = bounds;
                 }
             }
         }
@@ -350,9 +345,13 @@ impl Components {
     }
 }
 
+fn longest_edge(bounds: &Aabb) -> f64 {
+    (bounds.maxs - bounds.mins).max_element()
+}
+
 /// Whether two components are closer to each other than components of one person may be.
 fn near(a: &Component, b: &Component) -> bool {
-    let gap = (a.low - b.high).max(b.low - a.high).max(Vec3::ZERO).length();
+    let gap = (a.bounds.mins - b.bounds.maxs).max(b.bounds.mins - a.bounds.maxs).max(Vec3::ZERO).length();
     if gap > GAP {
         return false;
     }
@@ -397,7 +396,7 @@ mod tests {
         let (body, poses) = standing();
         let found = candidates(&before_wall(&body, &poses));
         assert_eq!(found.len(), 1, "{found:?}");
-        let (size, middle) = (found[0].high - found[0].low, found[0].middle());
+        let (size, middle) = (found[0].bounds.maxs - found[0].bounds.mins, found[0].bounds.center());
         assert!((1.5..1.85).contains(&size.y) && size.z < 0.5, "{size}");
         assert!(middle.distance(poses[0].translation) < 0.25, "{middle}");
     }
@@ -410,7 +409,7 @@ mod tests {
         put_board(&mut pixels, Vec3::new(0.0, 0.03, 1.6), [1.5, 0.03]);
         let found = candidates(&pixels);
         let whole = found.iter().find(|candidate| candidate.labels.len() > 1);
-        assert!(whole.is_some_and(|whole| (whole.high - whole.low).y > 1.5), "{found:?}");
+        assert!(whole.is_some_and(|whole| (whole.bounds.maxs - whole.bounds.mins).y > 1.5), "{found:?}");
     }
 
     #[test]

@@ -71,8 +71,8 @@ pub struct Detector {
     stature: Option<[f64; 2]>,
     memory: Memory,
     segmentation: Segmentation,
-    /// Candidate indices of the last image's detections.
-    found: Vec<usize>,
+    /// Candidates of the last image's detections.
+    found: Vec<PersonCandidate>,
     /// Log odds that the first evaluated candidate of the last image is a person, and its box in the world frame.
     nearest: Option<(f64, Aabb)>,
     rejections: Rejections,
@@ -106,25 +106,30 @@ impl Detector {
     pub fn with_stature(self, stature: f64, sigma: f64) -> Self {
         Self { stature: Some([stature, sigma]), ..self }
     }
+}
 
-    /// Indices of the last image's candidates that the query evaluates, in order of evaluation.
-    fn order(&self, query: DetectionQuery, camera_from_world: &Pose) -> Vec<usize> {
-        let mut order: Vec<usize> = (0..self.segmentation.candidates.len()).collect();
-        let at = |number: usize| &self.segmentation.candidates[number];
-        match query {
-            DetectionQuery::All => {}
-            DetectionQuery::Any => order.sort_by_key(|number| self.rejections.last_rejection(at(*number))),
-            DetectionQuery::New => {
-                order.retain(|number| !self.rejections.is_rejected(at(*number)));
-                order.sort_by_key(|number| self.rejections.last_rejection(at(*number)));
-            }
-            DetectionQuery::Near(place) => {
-                let place = *camera_from_world * place;
-                order.sort_by(|a, b| at(*a).distance(place).total_cmp(&at(*b).distance(place)));
-            }
-        }
-        order
+/// The candidates that a query evaluates, in order of evaluation.
+fn order<'a>(
+    candidates: &'a [PersonCandidate],
+    rejections: &Rejections,
+    query: DetectionQuery,
+    camera_from_world: &Pose,
+) -> Vec<&'a PersonCandidate> {
+    let mut order: Vec<_> = candidates.iter().collect();
+    if query == DetectionQuery::New {
+        order.retain(|candidate| !rejections.is_rejected(candidate));
     }
+    match query {
+        DetectionQuery::All => {}
+        DetectionQuery::Any | DetectionQuery::New => {
+            order.sort_by_key(|candidate| rejections.last_rejection(candidate));
+        }
+        DetectionQuery::Near(place) => {
+            let place = *camera_from_world * place;
+            order.sort_by(|a, b| a.distance(place).total_cmp(&b.distance(place)));
+        }
+    }
+    order
 }
 
 impl Detect for Detector {
@@ -161,12 +166,10 @@ impl Detect for Detector {
         self.nearest = None;
         self.rejections.next_image();
         self.segmentation.find(image, around);
-        let order = self.order(query, &image.world_from_sensor.inverse());
-        let Self { memory, segmentation, found: numbers, nearest, rejections, stature, .. } = self;
-        let mut found: Vec<(usize, Detection)> = Vec::new();
+        let Self { memory, segmentation, found: shown, nearest, rejections, stature, .. } = self;
+        let mut found: Vec<(&PersonCandidate, Detection)> = Vec::new();
         let mut evaluations = 0;
-        for number in order {
-            let candidate = &segmentation.candidates[number];
+        for candidate in order(&segmentation.candidates, rejections, query, &image.world_from_sensor.inverse()) {
             let mut evaluate = |enlarged: f64| {
                 let crop = segmentation.crop(candidate, enlarged)?;
                 let answer = network.evaluate(&crop.pixels, memory);
@@ -189,7 +192,7 @@ impl Detect for Detector {
             }
             rejections.record(candidate, detection.person > PERSON);
             if detection.person > PERSON {
-                found.push((number, detection));
+                found.push((candidate, detection));
             }
             if evaluations == MAX_EVALUATIONS || query != DetectionQuery::All {
                 break;
@@ -201,15 +204,14 @@ impl Detect for Detector {
             Ground { normal, offset: floor.offset + normal.dot(image.world_from_sensor.translation) }
         });
         let mut kept = Vec::new();
-        for (number, mut detection) in found {
-            let candidate = &segmentation.candidates[number];
+        for (candidate, mut detection) in found {
             // Of candidates that share components only the most confident is kept.
-            if numbers.iter().any(|other| segmentation.candidates[*other].overlaps(candidate)) {
+            if shown.iter().any(|other| other.overlaps(candidate)) {
                 continue;
             }
             detection.floor = floor;
             segmentation.mask(candidate, &mut detection.pixels);
-            numbers.push(number);
+            shown.push(candidate.clone());
             kept.push(detection);
         }
         Ok(kept)
@@ -220,8 +222,7 @@ impl Detect for Detector {
     }
 
     fn reject(&mut self, index: usize) {
-        let number = self.found.get(index);
-        if let Some(candidate) = number.and_then(|number| self.segmentation.candidates.get(*number)) {
+        if let Some(candidate) = self.found.get(index) {
             self.rejections.record(candidate, false);
         }
     }
@@ -289,8 +290,7 @@ fn detection(answer: &Answer, crop: &Crop, candidate: &PersonCandidate, world_fr
     let length = |(length, scale): (&f32, &f32)| {
         [f64::from(*length).exp() / crop.enlarged, SIGMA_BY_SCALE * f64::from(*scale).exp()]
     };
-    let corners = Aabb::new(candidate.low, candidate.high).corners();
-    let bounds = Aabb::from_points(corners.map(|corner| *world_from_camera * corner));
+    let bounds = Aabb::from_points(candidate.bounds.corners().map(|corner| *world_from_camera * corner));
     Detection {
         joints,
         lengths: answer.log_lengths.iter().zip(&answer.log_length_scale).map(length).collect(),

@@ -74,7 +74,7 @@ fn product(layer: &Panels, values: &[f32]) -> Vec<f32> {
 }
 
 /// The network's output for an input image.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
     /// Positions of the joints: meters right of, below and behind the center of the input image.
     pub joints: Vec<[f32; 3]>,
@@ -93,6 +93,7 @@ pub struct Answer {
 }
 
 /// The trained layers.
+#[derive(Debug)]
 pub struct Network {
     stages: [Stage; 4],
     top: [Convolution; 2],
@@ -101,12 +102,6 @@ pub struct Network {
     hidden: Panels,
     /// Whether each joint is visible, facing, person, scale of each joint's error, lengths, and scales of their errors.
     overall: [Panels; 6],
-}
-
-impl std::fmt::Debug for Network {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Network").field("joints", &self.joints()).finish_non_exhaustive()
-    }
 }
 
 /// Working memory of a network.
@@ -163,7 +158,10 @@ impl Network {
                 block.apply(&mut rest[0], between, working);
             }
         }
-        let mut answer = self.overall(&mean(&maps[3]));
+        let mut values = product(&self.hidden, &mean(&maps[3]));
+        rectify(&mut values);
+        let [visible, facing, person, log_scale, log_lengths, log_length_scale] =
+            self.overall.each_ref().map(|layer| product(layer, &values));
         top.clone_from(&maps[3]);
         for (layer, skip) in self.top.iter().zip([&maps[2], &maps[1]]) {
             layer.apply(top, &mut between[0], working, true);
@@ -171,18 +169,9 @@ impl Network {
         }
         self.middle.apply(top, between, working);
         self.head.apply(top, &mut between[0], working, false);
-        answer.joints = (0..self.joints()).map(|joint| place(&between[0], joint)).collect();
-        answer
-    }
-
-    /// Computes the outputs that depend on the whole image.
-    fn overall(&self, pooled: &[f32]) -> Answer {
-        let mut values = product(&self.hidden, pooled);
-        rectify(&mut values);
-        let [visible, facing, person, log_scale, log_lengths, log_length_scale] =
-            self.overall.each_ref().map(|layer| product(layer, &values));
+        let joints = (0..self.joints()).map(|joint| place(&between[0], joint)).collect();
         let (facing, person) = (facing[0], person[0]);
-        Answer { joints: Vec::new(), log_scale, visible, facing, person, log_lengths, log_length_scale }
+        Answer { joints, log_scale, visible, facing, person, log_lengths, log_length_scale }
     }
 }
 

@@ -2,7 +2,6 @@
 //! sooner.
 
 use crate::components::PersonCandidate;
-use voodoo_core::math::Vec3;
 
 /// A candidate is the same object as a rejected one if it lies within this distance, meters, and their surface areas differ by
 /// less than the factor below.
@@ -13,18 +12,11 @@ const MOST_REJECTED: usize = 16;
 /// Number of images for which a rejected candidate is not reported as new.
 const REJECTED_IMAGES: usize = 5;
 
-/// Rejected positions, camera frame, the latest last.
+/// Rejected candidates and the number of the image in which each was rejected, the latest last.
 #[derive(Debug, Default)]
 pub(crate) struct Rejections {
     images: usize,
-    places: Vec<Rejected>,
-}
-
-#[derive(Debug)]
-struct Rejected {
-    middle: Vec3,
-    area: f64,
-    image: usize,
+    rejected: Vec<(usize, PersonCandidate)>,
 }
 
 impl Rejections {
@@ -35,29 +27,29 @@ impl Rejections {
 
     /// Whether a candidate was rejected recently.
     pub(crate) fn is_rejected(&self, candidate: &PersonCandidate) -> bool {
-        self.places.iter().any(|place| self.images - place.image < REJECTED_IMAGES && place.matches(candidate))
+        self.rejected.iter().any(|(image, other)| self.images - image < REJECTED_IMAGES && are_alike(candidate, other))
     }
 
     /// Where a candidate is among the rejected ones, the latest of which is last; `None` for a new candidate.
     pub(crate) fn last_rejection(&self, candidate: &PersonCandidate) -> Option<usize> {
-        self.places.iter().rposition(|place| place.matches(candidate))
+        self.rejected.iter().rposition(|(_, other)| are_alike(candidate, other))
     }
 
     /// Records an evaluation.
     pub(crate) fn record(&mut self, candidate: &PersonCandidate, person: bool) {
-        self.places.retain(|place| !place.matches(candidate));
+        self.rejected.retain(|(_, other)| !are_alike(candidate, other));
         if !person {
-            if self.places.len() == MOST_REJECTED {
-                self.places.remove(0);
+            if self.rejected.len() == MOST_REJECTED {
+                self.rejected.remove(0);
             }
-            self.places.push(Rejected { middle: candidate.middle(), area: candidate.area, image: self.images });
+            self.rejected.push((self.images, candidate.clone()));
         }
     }
 }
 
-impl Rejected {
-    fn matches(&self, candidate: &PersonCandidate) -> bool {
-        let ratio = candidate.area / self.area;
-        self.middle.distance(candidate.middle()) < SAME_PLACE && ratio < SAME_AREA && ratio > 1.0 / SAME_AREA
-    }
+/// Whether a candidate is the same object as a rejected one.
+fn are_alike(candidate: &PersonCandidate, rejected: &PersonCandidate) -> bool {
+    let ratio = candidate.area / rejected.area;
+    let apart = rejected.bounds.center().distance(candidate.bounds.center());
+    apart < SAME_PLACE && ratio < SAME_AREA && ratio > 1.0 / SAME_AREA
 }

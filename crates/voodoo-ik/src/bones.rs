@@ -4,7 +4,7 @@ use super::image::Bone;
 use super::model::ChainModel;
 use super::trunk::{Carrier, Trunk};
 use voodoo_core::Body;
-use voodoo_core::math::Vec3;
+use voodoo_core::math::{Pose, Vec3};
 
 /// A limb attached to the trunk starts inside it; beyond this fraction of its length it must be outside.
 const FREE_OF_TRUNK: f64 = 0.5;
@@ -42,10 +42,10 @@ pub fn bones(body: &Body, model: &ChainModel, margin: f64) -> Vec<Bone> {
 }
 
 /// The trunk: limbs of the chain, and its base, from which several other limbs branch.
-pub fn trunk(body: &Body, model: &ChainModel) -> Vec<Trunk> {
+pub fn trunk(body: &Body, model: &ChainModel, world_from_base: &Pose) -> Vec<Trunk> {
     let base = model.links().first().and_then(|link| body.parent(link.limb));
     let links = model.links().iter().enumerate().map(|(index, link)| (Carrier::Link(index), link.limb));
-    let limbs = base.map(|limb| (Carrier::Base, limb)).into_iter().chain(links);
+    let limbs = base.map(|limb| (Carrier::World(*world_from_base), limb)).into_iter().chain(links);
     let trunk = limbs.filter(|(_, limb)| branches(body, *limb));
     trunk.map(|(carrier, limb)| Trunk { carrier, shape: body.limbs()[limb].shape }).collect()
 }

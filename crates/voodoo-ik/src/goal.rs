@@ -1,7 +1,5 @@
 //! Targets of sites: a position, or a line of sight.
 
-use std::ops::Range;
-
 use super::model::{ChainModel, Kinematics};
 use voodoo_core::math::{Vec3, reset};
 
@@ -81,21 +79,12 @@ pub fn level_rows(
         let root = goal.weight.sqrt();
         residual.extend((root * goal.aim.residual(x)).to_array());
         let rows = &mut jacobian[3 * index * n..3 * (index + 1) * n];
-        for &mover in &model.movers[goal.link] {
+        for &mover in &model.links()[goal.link].movers {
             let column = &at.columns[mover];
             let d = root * goal.aim.derivative(column.omega.cross(x) + column.v);
             rows[mover] = d.x;
             rows[n + mover] = d.y;
             rows[2 * n + mover] = d.z;
         }
-    }
-}
-
-/// The ranges of equal levels in goals sorted by level.
-pub(super) fn level_ranges(goals: &[Goal], ranges: &mut Vec<Range<usize>>) {
-    ranges.clear();
-    for same in goals.chunk_by(|a, b| a.level == b.level) {
-        let start = ranges.last().map_or(0, |before: &Range<usize>| before.end);
-        ranges.push(start..start + same.len());
     }
 }

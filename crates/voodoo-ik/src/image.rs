@@ -147,7 +147,7 @@ impl Criterion<'_> {
 /// Adds the derivative by all unknowns that move a link, given a force on it at a world position.
 fn add_force(model: &ChainModel, at: &Kinematics, link: usize, x: Vec3, force: Vec3, gradient: &mut [f64]) {
     let moment = x.cross(force);
-    for &mover in &model.movers[link] {
+    for &mover in &model.links()[link].movers {
         let column = &at.columns[mover];
         gradient[mover] += column.omega.dot(moment) + column.v.dot(force);
     }

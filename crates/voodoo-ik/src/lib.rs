@@ -19,6 +19,6 @@ pub use goal::{Aim, Goal, level_cost, level_rows};
 pub use image::{Bone, Criterion, SAMPLES};
 pub use model::{ChainModel, Column, Kinematics, Link, Root, Turn};
 pub use project::{project, read};
-pub use solver::{IkSolver, Report, Rest, SolverOptions};
+pub use solver::{IkProblem, IkSolver, Report, Rest, SolverOptions};
 pub use trunk::{Carrier, Trunk};
 pub use view::SilhouetteView;

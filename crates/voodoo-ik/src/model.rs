@@ -41,16 +41,16 @@ pub struct Link {
     pub turn: Turn,
     /// Its first unknown.
     pub start: usize,
+    /// The unknowns that move it.
+    pub(super) movers: Vec<usize>,
 }
 
 /// The chain: everything that stays constant while it moves.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ChainModel {
     links: Vec<Link>,
     names: Vec<String>,
     limits: Vec<[f64; 2]>,
-    /// For every link, the unknowns that move it.
-    pub(super) movers: Vec<Vec<usize>>,
 }
 
 /// Derivative of the world position of a point `x` on any limb distal to the joint: `omega x x + v` for a unit rate of the
@@ -66,8 +66,6 @@ pub struct Column {
 /// Poses and derivatives at one vector of angles; memory to be reused.
 #[derive(Clone, Debug, Default)]
 pub struct Kinematics {
-    /// World pose of the base.
-    pub base: Pose,
     /// World pose of every link.
     pub poses: Vec<Pose>,
     /// One column per unknown.
@@ -82,7 +80,7 @@ impl ChainModel {
         let mut chosen = if limbs.is_empty() { all } else { limbs.to_vec() };
         chosen.sort_unstable();
         chosen.dedup();
-        let mut model = Self { links: Vec::new(), names: Vec::new(), limits: Vec::new(), movers: Vec::new() };
+        let mut model = Self::default();
         for limb in chosen {
             let Some(description) = body.limbs().get(limb) else {
                 return Err(BodyError::value("limbs", "indices of limbs", limb.to_string()));
@@ -123,10 +121,9 @@ impl ChainModel {
                 }
             }
         };
-        let mut movers = parent.map_or_else(Vec::new, |parent| self.movers[parent].clone());
+        let mut movers = parent.map_or_else(Vec::new, |parent| self.links[parent].movers.clone());
         movers.extend(start..self.names.len());
-        self.movers.push(movers);
-        self.links.push(Link { limb, parent, parent_from_joint, joint_from_limb, turn, start });
+        self.links.push(Link { limb, parent, parent_from_joint, joint_from_limb, turn, start, movers });
         Ok(())
     }
 
@@ -157,8 +154,7 @@ impl ChainModel {
 
     /// Forward kinematics and its derivative (R07 eq. 10): poses of all links and the screw of every unknown.
     pub fn place(&self, world_from_base: &Pose, angles: &[f64], at: &mut Kinematics) {
-        let Kinematics { base, poses, columns } = at;
-        *base = *world_from_base;
+        let Kinematics { poses, columns } = at;
         poses.clear();
         columns.clear();
         for link in &self.links {

@@ -2,7 +2,7 @@
 
 use super::goal::{Aim, Goal};
 use super::model::{ChainModel, Turn};
-use super::solver::{IkSolver, SolverOptions};
+use super::solver::{IkProblem, IkSolver, SolverOptions};
 use voodoo_core::kinematics::joint_turn;
 use voodoo_core::math::{Pose, Vec3, reset, rotation_vector};
 use voodoo_core::{Body, Joint};
@@ -47,5 +47,6 @@ pub fn project(body: &Body, model: &ChainModel, world_from_base: &Pose, poses: &
         }
     }
     let options = SolverOptions { steps: 20, tolerance: 1e-9, still: 1e-8, ..SolverOptions::default() };
-    IkSolver::default().solve(model, world_from_base, &goals, None, &options, angles);
+    let problem = IkProblem { model, base: *world_from_base, goals: &goals, criterion: None, rest: &[], options };
+    IkSolver::default().solve(&problem, angles);
 }

@@ -12,8 +12,6 @@ const CLEARANCE: f64 = 0.5;
 /// What carries a limb that no bone may enter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Carrier {
-    /// The base of the chain.
-    Base,
     /// A link of the chain.
     Link(usize),
     /// It is not part of the chain and has this pose in the world.
@@ -33,7 +31,6 @@ impl Trunk {
     /// Its pose.
     pub(super) fn pose(&self, at: &Kinematics) -> Pose {
         match self.carrier {
-            Carrier::Base => at.base,
             Carrier::Link(link) => at.poses[link],
             Carrier::World(pose) => pose,
         }

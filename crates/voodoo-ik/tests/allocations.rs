@@ -8,7 +8,9 @@ use counting::allocations_so_far;
 use voodoo_core::HumanModel;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::{Body, Camera};
-use voodoo_ik::{Aim, ChainModel, Criterion, Goal, IkSolver, Rest, Root, SilhouetteView, SolverOptions, bones, trunk};
+use voodoo_ik::{
+    Aim, ChainModel, Criterion, Goal, IkProblem, IkSolver, Rest, Root, SilhouetteView, SolverOptions, bones, trunk,
+};
 
 const WARM_UP: usize = 26;
 const COUNTED: usize = 60;
@@ -26,9 +28,10 @@ fn allocations() -> usize {
     let camera = Camera::pinhole(160, 120, [140.0, 140.0, 79.5, 59.5]).unwrap();
     let view = SilhouetteView { pixels, depth: Vec::new(), border: 1.0, camera, camera_from_world };
     let segments = bones(&body, &model, 1.0);
-    let trunk = trunk(&body, &model);
+    let trunk = trunk(&body, &model, &Pose::IDENTITY);
     let criterion = Criterion { views: &[&view], segments: &segments, thin: 1.7, trunk: &trunk };
-    let mut solver = IkSolver::with_rest((6..model.freedoms()).map(|unknown| Rest { unknown, angle: 0.1 }).collect());
+    let rest: Vec<Rest> = (6..model.freedoms()).map(|unknown| Rest { unknown, angle: 0.1 }).collect();
+    let mut solver = IkSolver::default();
     let mut count = 0;
     for index in 0..WARM_UP + COUNTED {
         let by = 0.02 * index as f64;
@@ -40,7 +43,9 @@ fn allocations() -> usize {
         });
         let mut angles = vec![0.1; model.freedoms()];
         let before = allocations_so_far();
-        solver.solve(&model, &Pose::IDENTITY, &goals, Some(&criterion), &SolverOptions::default(), &mut angles);
+        let (model, base, options) = (&model, Pose::IDENTITY, SolverOptions::default());
+        let problem = IkProblem { model, base, goals: &goals, criterion: Some(&criterion), rest: &rest, options };
+        solver.solve(&problem, &mut angles);
         if index >= WARM_UP {
             count += allocations_so_far() - before;
         }

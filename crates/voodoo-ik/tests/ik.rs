@@ -8,8 +8,8 @@ use voodoo_core::kinematics::exp;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::{Body, Camera};
 use voodoo_ik::{
-    Aim, Bone, Carrier, ChainModel, Criterion, Goal, IkSolver, Kinematics, Root, SilhouetteView, SolverOptions, Trunk,
-    bones, level_rows, project, trunk,
+    Aim, Bone, Carrier, ChainModel, Criterion, Goal, IkProblem, IkSolver, Kinematics, Root, SilhouetteView,
+    SolverOptions, Trunk, bones, level_rows, project, trunk,
 };
 
 fn human() -> Body {
@@ -126,7 +126,7 @@ proptest! {
         let deep = SilhouetteView { depth, ..view.clone() };
         let mut segments = bones(&body, &model, 0.0);
         segments.iter_mut().for_each(|segment: &mut Bone| segment.radius = [radius, 0.5 * radius]);
-        let mut trunk = trunk(&body, &model);
+        let mut trunk = trunk(&body, &model, &Pose::IDENTITY);
         prop_assert_eq!(trunk.len(), 2);
         // A limb beside the chain, through the body's middle.
         let beside = Pose::from_parts(Vec3::new(0.1, 0.0, -0.3), Quat::from_axis_angle(Vec3::Y, 0.3));
@@ -154,7 +154,7 @@ proptest! {
     #[test]
     fn no_bone_in_the_trunk(x in -0.2..0.2_f64, y in -0.2..0.2_f64) {
         let (body, model) = arm();
-        let trunk = trunk(&body, &model);
+        let trunk = trunk(&body, &model, &Pose::IDENTITY);
         // The base of an arm is the trunk.
         prop_assert_eq!(trunk.len(), 1);
         let image = vec![[-100.0_f32, 0.0]; 160 * 120];
@@ -210,14 +210,14 @@ proptest! {
     fn lower_levels_never_disturb_higher_ones(start in values(6, 0.4), hand in values(3, 0.9), elbow in values(3, 0.9)) {
         let (body, model) = arm();
         let shoulder = model.links()[0].parent_from_joint.translation;
-        let mut options = SolverOptions::default();
-        (options.steps, options.tolerance, options.still) = (400, 1e-12, 1e-12);
+        let options = SolverOptions { steps: 400, tolerance: 1e-12, still: 1e-12, ..SolverOptions::default() };
         let top = goal(&body, &model, "l_hand", Aim::Position(shoulder + Vec3::new(hand[0], hand[1], hand[2])), 0);
         let low = goal(&body, &model, "l_elbow", Aim::Position(shoulder + Vec3::new(elbow[0], elbow[1], elbow[2])), 1);
         let third = goal(&body, &model, "l_wrist", Aim::Position(Vec3::ZERO), 2);
         let residual = |goals: &[Goal]| {
             let mut angles = start[..model.freedoms()].to_vec();
-            IkSolver::default().solve(&model, &Pose::IDENTITY, goals, None, &options, &mut angles);
+            let problem = IkProblem { model: &model, base: Pose::IDENTITY, goals, criterion: None, rest: &[], options };
+            IkSolver::default().solve(&problem, &mut angles);
             for (angle, [least, greatest]) in angles.iter().zip(model.limits()) {
                 prop_assert!(*least <= *angle && *angle <= *greatest);
             }

@@ -6,14 +6,12 @@ use voodoo_core::HumanModel;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::{Body, Camera};
 use voodoo_ik::{
-    Aim, ChainModel, Criterion, Goal, IkSolver, Kinematics, Rest, Root, SilhouetteView, SolverOptions, bones,
-    level_cost, level_rows, trunk,
+    Aim, ChainModel, Criterion, Goal, IkProblem, IkSolver, Kinematics, Rest, Root, SilhouetteView, SolverOptions,
+    bones, level_cost, level_rows, trunk,
 };
 
 fn long() -> SolverOptions {
-    let mut options = SolverOptions::default();
-    (options.steps, options.tolerance, options.still) = (400, 1e-12, 1e-9);
-    options
+    SolverOptions { steps: 400, tolerance: 1e-12, still: 1e-9, ..SolverOptions::default() }
 }
 
 struct Arm {
@@ -59,8 +57,9 @@ impl Arm {
 
     fn solve(&self, goals: &[Goal], criterion: Option<&Criterion>, start: &[f64], rest: Vec<Rest>) -> Vec<f64> {
         let mut angles = start.to_vec();
-        let report =
-            IkSolver::with_rest(rest).solve(&self.model, &Pose::IDENTITY, goals, criterion, &long(), &mut angles);
+        let problem =
+            IkProblem { model: &self.model, base: Pose::IDENTITY, goals, criterion, rest: &rest, options: long() };
+        let report = IkSolver::default().solve(&problem, &mut angles);
         let h = criterion.map_or(0.0, |criterion| self.h(criterion, &angles));
         assert!((report.h - h).abs() < 1e-9, "{} {h}", report.h);
         for (angle, [low, high]) in angles.iter().zip(self.model.limits()) {
@@ -116,7 +115,7 @@ proptest! {
             arm.goal("l_hand", &arm.within(&hand), beyond * Vec3::X, 0),
             arm.goal("l_elbow", &arm.within(&elbow), Vec3::ZERO, 1),
         ];
-        let (pixels, bones, trunk) = (half(at, slope), bones(&arm.body, &arm.model, 1.1), trunk(&arm.body, &arm.model));
+        let (pixels, bones, trunk) = (half(at, slope), bones(&arm.body, &arm.model, 1.1), trunk(&arm.body, &arm.model, &Pose::IDENTITY));
         let criterion = Criterion { views: &[&view(pixels)], segments: &bones, thin: 1.7, trunk: &trunk };
         let mut rest = rest_at(&rest[..arm.model.freedoms()]);
         rest.truncate(drawn);
@@ -186,7 +185,7 @@ proptest! {
 fn rest_goes_along_the_border_of_the_silhouette() {
     let arm = Arm::loose();
     let n = arm.model.freedoms();
-    let (bones, trunk) = (bones(&arm.body, &arm.model, 1.1), trunk(&arm.body, &arm.model));
+    let (bones, trunk) = (bones(&arm.body, &arm.model, 1.1), trunk(&arm.body, &arm.model, &Pose::IDENTITY));
     // The arm hangs within the silhouette; at rest it would be stretched out to the side, beyond its border, and forwards.
     let side = arm.place(&vec![0.0; n]).poses[0].translation.y;
     let start = vec![0.0; n];

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::{IntoPyDict, PyDict};
+use pyo3::types::IntoPyDict;
 use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::{
     Body, Camera, DepthImage, DepthPixels, Detect, DetectError, Detection, DetectionQuery, Frame, Ground, HumanModel,
@@ -42,7 +42,12 @@ impl PyDetector {
 
     #[doc = stub!("Detector.detect")]
     #[pyo3(signature = (frame, *, up=None))]
-    fn detect(&mut self, py: Python<'_>, frame: &PyFrame, up: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<PyDetection>> {
+    fn detect<'py>(
+        &mut self,
+        py: Python<'py>,
+        frame: &PyFrame,
+        up: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let any = Body::human(1.75, HumanModel::Full).map_err(raise)?;
         let views = frame.depth_views(py)?;
         let images = depth_images(&views)?;
@@ -68,7 +73,7 @@ impl PyDetector {
         let mut found = found.map_err(|error| MeasurementError::new_err(error.to_string()))?;
         found.sort_by(|(a, _), (b, _)| b.person.total_cmp(&a.person));
         let source = |image: &DepthImage| frame.sources.get(usize::from(image.source)).cloned().unwrap_or_default();
-        found.iter().map(|(detection, image)| PyDetection::new(py, detection, image, source(image))).collect()
+        found.iter().map(|(detection, image)| self::detection(py, detection, image, source(image))).collect()
     }
 
     fn __repr__(&self) -> String {
@@ -83,88 +88,41 @@ fn with_weights(path: PathBuf) -> PyResult<Detector> {
     Detector::with_weights(&bytes).map_err(|error| refused(error.to_string()))
 }
 
-#[doc = stub!("Detection")]
-#[pyclass(name = "Detection", module = "voodoo", frozen, get_all)]
-pub(crate) struct PyDetection {
-    #[doc = stub!("Detection.joints")]
-    joints: Py<PyDict>,
-    #[doc = stub!("Detection.joint_sigma")]
-    joint_sigma: Py<PyDict>,
-    #[doc = stub!("Detection.visible")]
-    visible: Py<PyDict>,
-    #[doc = stub!("Detection.lengths")]
-    lengths: Py<PyDict>,
-    #[doc = stub!("Detection.length_sigma")]
-    length_sigma: Py<PyDict>,
-    #[doc = stub!("Detection.stature")]
-    stature: f64,
-    #[doc = stub!("Detection.facing")]
-    facing: f64,
-    #[doc = stub!("Detection.confidence")]
-    confidence: f64,
-    #[doc = stub!("Detection.source")]
-    source: String,
-    #[doc = stub!("Detection.mask")]
-    mask: Py<PyArray2<bool>>,
-    #[doc = stub!("Detection.floor")]
-    floor: Option<([f64; 3], f64)>,
-}
-
 /// Converts log odds to a probability.
 fn probability(log_odds: f64) -> f64 {
     1.0 / (1.0 + (-log_odds).exp())
 }
 
 /// An image of the pixels with these indices, as a mask.
-fn mask(py: Python<'_>, camera: &Camera, pixels: &[usize]) -> PyResult<Py<PyArray2<bool>>> {
+fn mask<'py>(py: Python<'py>, camera: &Camera, pixels: &[usize]) -> PyResult<Bound<'py, PyArray2<bool>>> {
     let mut mask = vec![false; camera.pixels()];
     pixels.iter().for_each(|pixel| mask[*pixel] = true);
-    Ok(PyArray1::from_vec(py, mask).reshape([camera.height(), camera.width()])?.unbind())
+    PyArray1::from_vec(py, mask).reshape([camera.height(), camera.width()])
 }
 
-impl PyDetection {
-    fn new(py: Python<'_>, found: &Detection, image: &DepthImage, source: String) -> PyResult<Self> {
-        let joints = || JOINTS.iter().zip(found.joints.iter().flatten());
-        let lengths = || LENGTHS.iter().zip(&found.lengths);
-        Ok(Self {
-            joints: joints().map(|(name, joint)| (name, Row(joint.position))).into_py_dict(py)?.unbind(),
-            joint_sigma: joints().map(|(name, joint)| (name, joint.sigma)).into_py_dict(py)?.unbind(),
-            visible: joints().map(|(name, joint)| (name, joint.visible)).into_py_dict(py)?.unbind(),
-            lengths: lengths().map(|(name, [length, _])| (name, *length)).into_py_dict(py)?.unbind(),
-            length_sigma: lengths().map(|(name, [length, part])| (name, length * part)).into_py_dict(py)?.unbind(),
-            stature: found.lengths.last().map_or(f64::NAN, |length| length[0]),
-            facing: probability(found.facing.unwrap_or(0.0)),
-            confidence: probability(found.person),
-            source,
-            mask: mask(py, image.camera, &found.pixels)?,
-            floor: found.floor.map(|floor| (floor.normal.to_array(), floor.offset)),
-        })
-    }
-}
-
-#[pymethods]
-impl PyDetection {
-    fn __repr__(&self) -> String {
-        format!(
-            "Detection(source={:?}, confidence={:.2}, facing={:.2}, stature={:.2})",
-            self.source, self.confidence, self.facing, self.stature
-        )
-    }
-}
-
-#[doc = stub!("PersonCandidate")]
-#[pyclass(name = "PersonCandidate", module = "voodoo._core", frozen, get_all)]
-pub(crate) struct PyCandidate {
-    #[doc = stub!("PersonCandidate.crop")]
-    crop: Py<PyArray3<f32>>,
-    #[doc = stub!("PersonCandidate.mask")]
-    mask: Py<PyArray2<bool>>,
-    #[doc = stub!("PersonCandidate.middle")]
-    middle: [f64; 3],
-    #[doc = stub!("PersonCandidate.roll")]
-    roll: f64,
-    #[doc = stub!("PersonCandidate.floor")]
-    floor: Option<([f64; 3], f64)>,
+/// A `voodoo.Detection`.
+fn detection<'py>(
+    py: Python<'py>,
+    found: &Detection,
+    image: &DepthImage,
+    source: String,
+) -> PyResult<Bound<'py, PyAny>> {
+    let joints = || JOINTS.iter().zip(found.joints.iter().flatten());
+    let lengths = || LENGTHS.iter().zip(&found.lengths);
+    let fields = (
+        joints().map(|(name, joint)| (name, Row(joint.position))).into_py_dict(py)?,
+        joints().map(|(name, joint)| (name, joint.sigma)).into_py_dict(py)?,
+        joints().map(|(name, joint)| (name, joint.visible)).into_py_dict(py)?,
+        lengths().map(|(name, [length, _])| (name, *length)).into_py_dict(py)?,
+        lengths().map(|(name, [length, part])| (name, length * part)).into_py_dict(py)?,
+        found.lengths.last().map_or(f64::NAN, |length| length[0]),
+        probability(found.facing.unwrap_or(0.0)),
+        probability(found.person),
+        source,
+        mask(py, image.camera, &found.pixels)?,
+        found.floor.map(|floor| (floor.normal.to_array(), floor.offset)),
+    );
+    py.import("voodoo.detectors.base")?.getattr("Detection")?.call1(fields)
 }
 
 #[doc = stub!("person_candidates")]
@@ -178,7 +136,7 @@ pub(crate) fn person_candidates<'py>(
     floor: Option<([f64; 3], f64)>,
     most: usize,
     enlarged: f64,
-) -> PyResult<Vec<PyCandidate>> {
+) -> PyResult<Vec<Bound<'py, PyAny>>> {
     let wrong = || wrong_argument("depth", "an array of shape (height, width) and dtype float32", depth);
     let array = contiguous(depth).map_err(|_| wrong())?.cast_into::<PyArray2<f32>>().map_err(|_| wrong())?;
     let view = array.readonly();
@@ -202,18 +160,15 @@ pub(crate) fn person_candidates<'py>(
     };
     let mut segmentation = Segmentation::default();
     segmentation.find(&image, &around);
+    let class = py.import("voodoo.detectors.base")?.getattr("PersonCandidate")?;
     let (mut found, mut pixels) = (Vec::new(), Vec::new());
     for candidate in segmentation.candidates.iter().take(most) {
         let Some(crop) = segmentation.crop(candidate, enlarged) else { continue };
         segmentation.mask(candidate, &mut pixels);
         let channels: Vec<f32> = (0..2).flat_map(|c| crop.pixels.iter().map(move |pixel| pixel[c])).collect();
-        found.push(PyCandidate {
-            crop: PyArray1::from_vec(py, channels).reshape([2, SIZE, SIZE])?.unbind(),
-            mask: mask(py, &camera, &pixels)?,
-            middle: crop.middle,
-            roll: crop.roll,
-            floor: segmentation.floor.map(|floor| (floor.normal.to_array(), floor.offset)),
-        });
+        let picture = PyArray1::from_vec(py, channels).reshape([2, SIZE, SIZE])?;
+        let floor = segmentation.floor.map(|floor| (floor.normal.to_array(), floor.offset));
+        found.push(class.call1((picture, mask(py, &camera, &pixels)?, crop.middle, crop.roll, floor))?);
     }
     Ok(found)
 }

@@ -81,21 +81,6 @@ impl PythonDetector {
         Ok(Self { joints: names("joints")?, lengths: names("lengths")?, object: Arc::new(object.clone().unbind()) })
     }
 
-    fn ask(
-        &self,
-        py: Python<'_>,
-        image: &DepthImage,
-        around: &Surroundings,
-        query: DetectionQuery,
-    ) -> PyResult<Vec<Detection>> {
-        let input = input(py, image, around, query)?;
-        let found = self.object.bind(py).call_method1("detect", (input,))?;
-        let mut persons =
-            found.try_iter()?.map(|person| self.detection(&person?, image)).collect::<PyResult<Vec<Detection>>>()?;
-        persons.sort_by(|a, b| b.person.total_cmp(&a.person));
-        Ok(persons)
-    }
-
     /// Converts an object with the attributes of `voodoo.detectors.DetectedPerson`.
     fn detection(&self, person: &Bound<'_, PyAny>, image: &DepthImage) -> PyResult<Detection> {
         if person.getattr("joints")?.is_none() {
@@ -160,7 +145,13 @@ impl Detect for PythonDetector {
         query: DetectionQuery,
     ) -> Result<Vec<Detection>, DetectError> {
         // A step has released the GIL.
-        Python::attach(|py| self.ask(py, image, around, query)).map_err(DetectError::from)
+        let found = Python::attach(|py| {
+            let found = self.object.bind(py).call_method1("detect", (input(py, image, around, query)?,))?;
+            found.try_iter()?.map(|person| self.detection(&person?, image)).collect::<PyResult<Vec<Detection>>>()
+        });
+        let mut persons = found?;
+        persons.sort_by(|a, b| b.person.total_cmp(&a.person));
+        Ok(persons)
     }
 }
 

@@ -6,7 +6,7 @@ use pyo3::types::PyTuple;
 use voodoo_core::Body;
 use voodoo_core::math::Vec3;
 use voodoo_ik::{
-    self, Aim, Bone, Carrier, ChainModel, Criterion, Goal, IkSolver, Kinematics, Rest, Root, SilhouetteView,
+    self, Aim, Bone, Carrier, ChainModel, Criterion, Goal, IkProblem, IkSolver, Kinematics, Rest, Root, SilhouetteView,
     SolverOptions, Trunk,
 };
 
@@ -32,19 +32,12 @@ pub struct PyChain {
     model: ChainModel,
 }
 
-fn options((steps, tolerance, still, gain, caution, largest_turn): OptionParts) -> SolverOptions {
-    let mut options = SolverOptions::default();
-    (options.steps, options.tolerance, options.still) = (steps, tolerance, still);
-    (options.gain, options.caution, options.largest_turn) = (gain, caution, largest_turn);
-    options
-}
-
 impl PyChain {
     fn site(&self, name: &str) -> PyResult<(usize, Vec3)> {
         let index = self.body.site_index(name).map_err(raise)?;
         let site = &self.body.sites()[index];
         self.model.link_of(site.limb).map(|link| (link, site.position)).ok_or_else(|| {
-            let known = self.site_names().join(", ");
+            let known = self.site_links().map(|(name, _, _)| name).collect::<Vec<_>>().join(", ");
             BodyError::new_err(format!("site: expected one on the chain ({known}), found {name:?}"))
         })
     }
@@ -70,8 +63,8 @@ impl PyChain {
     }
 
     /// The trunk, and limbs of the body beside the chain with their world poses.
-    fn trunk(&self, others: &[(String, Bound<'_, PyAny>)]) -> PyResult<Vec<Trunk>> {
-        let mut found = voodoo_ik::trunk(&self.body, &self.model);
+    fn trunk(&self, base: &Bound<'_, PyAny>, others: &[(String, Bound<'_, PyAny>)]) -> PyResult<Vec<Trunk>> {
+        let mut found = voodoo_ik::trunk(&self.body, &self.model, &pose("world_from_base", Some(base))?);
         for (name, world_from_limb) in others {
             let limb = self.body.limb_index(name).map_err(raise)?;
             if self.model.link_of(limb).is_some() {
@@ -115,24 +108,11 @@ impl PyChain {
         Ok(Self { body: body.0.clone(), model })
     }
 
-    #[getter]
-    fn angle_names(&self) -> Vec<String> {
-        self.model.names().to_vec()
-    }
-
-    #[getter]
-    fn limits(&self) -> Vec<[f64; 2]> {
-        self.model.limits().to_vec()
-    }
-
-    #[getter]
-    fn limb_names(&self) -> Vec<String> {
-        self.model.links().iter().map(|link| self.body.limbs()[link.limb].name.clone()).collect()
-    }
-
-    #[getter]
-    fn site_names(&self) -> Vec<String> {
-        self.site_links().map(|(name, _, _)| name.to_owned()).collect()
+    /// Names and limits of the angles, names of the limbs, and names of the sites.
+    fn parts(&self) -> (Vec<String>, Vec<[f64; 2]>, Vec<String>, Vec<String>) {
+        let limbs = self.model.links().iter().map(|link| self.body.limbs()[link.limb].name.clone());
+        let sites = self.site_links().map(|(name, _, _)| name.to_owned());
+        (self.model.names().to_vec(), self.model.limits().to_vec(), limbs.collect(), sites.collect())
     }
 
     /// Poses `(P, 4, 4)` of the limbs and positions `(S, 3)` of the sites.
@@ -170,7 +150,7 @@ impl PyChain {
         let at = self.place(base, &angles)?;
         let segments = self.bones(segments, depth.0)?;
         let views: Vec<&SilhouetteView> = views.iter().map(|view| &view.0).collect();
-        let trunk = self.trunk(&others)?;
+        let trunk = self.trunk(base, &others)?;
         let mut gradient = vec![0.0; self.model.freedoms()];
         let h = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk }.evaluate(
             &self.model,
@@ -217,20 +197,20 @@ impl PyChain {
         let [count, n] = [starts.shape()[0], starts.shape()[1]];
         let mut angles = starts.as_slice()?.to_vec();
         (0..count).try_for_each(|index| self.checked(&angles[index * n..(index + 1) * n]))?;
-        let base = pose("world_from_base", Some(base))?;
         let mut goals = self.goals(&goals)?;
         let segments = if views.is_empty() { Vec::new() } else { self.bones(segments, depth.0)? };
         let views: Vec<&SilhouetteView> = views.iter().map(|view| &view.0).collect();
-        let trunk = self.trunk(&others)?;
+        let trunk = self.trunk(base, &others)?;
         let criterion = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk };
         let positions = positions.as_ref().map(|positions| positions.as_slice()).transpose()?;
         let sites: Vec<(usize, Vec3)> = self.site_links().map(|(_, link, x)| (link, x)).collect();
-        let how = options(how);
+        let world_from_base = pose("world_from_base", Some(base))?;
+        let (steps, tolerance, still, gain, caution, largest_turn) = how;
+        let options = SolverOptions { steps, tolerance, still, gain, caution, largest_turn };
         let mut points = Vec::with_capacity(3 * sites.len() * count);
         let mut numbers = vec![0.0; 5 * count];
-        let rest = rest.into_iter().map(|(unknown, angle)| Rest { unknown, angle });
-        let mut solver = IkSolver::with_rest(rest.collect());
-        let mut ordered = Vec::new();
+        let rest: Vec<Rest> = rest.into_iter().map(|(unknown, angle)| Rest { unknown, angle }).collect();
+        let (mut solver, mut ordered) = (IkSolver::default(), Vec::new());
         py.detach(|| {
             let width = 3 * goals.len();
             for index in 0..count {
@@ -241,7 +221,8 @@ impl PyChain {
                 ordered.clone_from(&goals);
                 ordered.sort_by_key(|goal: &Goal| goal.level);
                 let row = &mut angles[index * n..(index + 1) * n];
-                let report = solver.solve(&self.model, &base, &ordered, Some(&criterion), &how, row);
+                let (model, base, goals, criterion) = (&self.model, world_from_base, &ordered, Some(&criterion));
+                let report = solver.solve(&IkProblem { model, base, goals, criterion, rest: &rest, options }, row);
                 let at = solver.kinematics();
                 points.extend(sites.iter().flat_map(|(link, x)| at.poses[*link].transform_point(*x).to_array()));
                 let counts = [report.steps, report.tried, report.compared, usize::from(report.converged)];

@@ -57,7 +57,7 @@ impl PyKeypointLayout {
     }
 
     /// Rays; sites with positions and their standard deviations; names of those not detected, and of those rejected.
-    #[pyo3(signature = (keypoints, predicted, *, stamp, source, world_from_sensor, camera, noise, place_sigma, least, only, gate, surface, before))]
+    #[pyo3(signature = (keypoints, predicted, *, stamp, source, world_from_sensor, camera, noise, place_sigma, least, gate, surface, before))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn observe<'py>(
         &self,
@@ -70,7 +70,6 @@ impl PyKeypointLayout {
         noise: f64,
         place_sigma: f64,
         least: f64,
-        only: Option<Vec<String>>,
         gate: Option<PyRefMut<'py, PySiteGate>>,
         surface: Option<&Bound<'py, PyAny>>,
         before: Option<&Bound<'py, PyAny>>,
@@ -84,9 +83,7 @@ impl PyKeypointLayout {
                 unseen.push(part.site.clone());
                 continue;
             };
-            let Some(expected) = place.filter(|_| only.as_ref().is_none_or(|only| only.contains(&part.site))) else {
-                continue;
-            };
+            let Some(expected) = place else { continue };
             let pixel = (found.pixel[0], found.pixel[1]);
             let surface: Option<f64> = surface.map_or(Ok(None), |surface| surface.call1((pixel,))?.extract())?;
             let hidden = before.map_or(Ok(None), |before| before.call_method1("get", (&part.site,))?.extract())?;

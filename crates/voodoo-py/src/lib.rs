@@ -38,7 +38,7 @@ use pyo3::prelude::*;
 mod _core {
     #[cfg(feature = "detect")]
     #[pymodule_export]
-    use super::detect::{PyCandidate, PyDetection, PyDetector, person_candidates};
+    use super::detect::{PyDetector, person_candidates};
     #[pymodule_export]
     use super::{
         body::PyBody,
@@ -53,7 +53,7 @@ mod _core {
         people::PyPeople,
         shape::{PyClosestPoints, PyShape},
         sites::{PySiteGate, PySiteRay, expected_sites},
-        skeleton::{cylinders, euler_angles, joint_angles, moved_covariances, placed, quaternions, skeleton},
+        skeleton::{euler_angles, quaternions, skeleton},
         skin::PySkinCue,
         template::{Template, people_text},
         tracker::{PyTracker, body_before},

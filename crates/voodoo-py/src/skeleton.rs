@@ -51,8 +51,12 @@ pub(crate) fn rotation(rows: &[f64; 9]) -> Mat3 {
     Mat3::from_cols_array(rows).transpose()
 }
 
-fn rows_of(rotation: &Mat3) -> [f64; 9] {
-    rotation.transpose().to_cols_array()
+pub(crate) fn poses_of(rows: &[[f64; 16]]) -> Vec<(Mat3, Vec3)> {
+    rows.iter().map(parts).collect()
+}
+
+pub(crate) fn points_of(rows: &[[f64; 3]]) -> Vec<Vec3> {
+    rows.iter().copied().map(Vec3::from_array).collect()
 }
 
 /// Rotation and translation of a 4x4 matrix.
@@ -76,8 +80,8 @@ pub(crate) fn bones(
     (turns.len() == body.limbs().len() && poses.len() == turns.len()).then_some((turns, heads))
 }
 
-/// Places of frames; and place and quaternion of each on its parent.
-pub(crate) fn placed_frames(turns: &[Mat3], points: &[Vec3], plan: &[[i64; 4]]) -> Option<(Vec<Vec3>, Vec<[f64; 7]>)> {
+/// Place and quaternion of each frame of a plan on its parent.
+pub(crate) fn placed_frames(turns: &[Mat3], points: &[Vec3], plan: &[[i64; 4]]) -> Option<Vec<[f64; 7]>> {
     let there = |&[limb, first, second, _]: &[i64; 4]| {
         Some((*entry(turns, limb)?, (*entry(points, first)? + *entry(points, second)?) / 2.0))
     };
@@ -89,14 +93,7 @@ pub(crate) fn placed_frames(turns: &[Mat3], points: &[Vec3], plan: &[[i64; 4]]) 
         let ([x, y, z], [a, b, c, d]) = (place.to_array(), math::quaternion(&turn));
         [x, y, z, a, b, c, d]
     };
-    let rows = found.iter().zip(plan).map(on_parent).collect();
-    Some((found.into_iter().map(|(_, place)| place).collect(), rows))
-}
-
-/// The body of each frame: the only one, or one of each.
-fn each<'a>(bodies: &'a [PyRef<'_, PyBody>]) -> impl Iterator<Item = &'a Body> {
-    let again = bodies.iter().cycle().take(if bodies.len() == 1 { usize::MAX } else { bodies.len() });
-    again.map(|body| &body.0)
+    Some(found.iter().zip(plan).map(on_parent).collect())
 }
 
 pub(crate) fn angles(turns: &[Mat3], plan: &[[i64; 8]]) -> Option<Vec<f64>> {
@@ -154,90 +151,21 @@ pub(crate) fn cylinder(Limb { shape, .. }: &Limb, &(turn, at): &(Mat3, Vec3)) ->
 #[pyfunction]
 pub(crate) fn skeleton<'py>(
     py: Python<'py>,
-    bodies: Vec<PyRef<'py, PyBody>>,
+    body: &PyBody,
     poses: Given<'py>,
     joints: Given<'py>,
     own: Plan<'py>,
 ) -> PyResult<(Array<'py>, Array<'py>)> {
     let (poses, joints, own) = (frames("poses", &poses)?, frames("joints", &joints)?, plan(&own)?);
     let (mut turns, mut heads) = (Vec::new(), Vec::new());
-    for ((poses, joints), body) in poses.iter().zip(&joints).zip(each(&bodies)) {
-        let poses: Vec<_> = poses.iter().map(parts).collect();
-        let joints: Vec<_> = joints.iter().copied().map(Vec3::from_array).collect();
-        let found = bones(body, &poses, &joints, own).ok_or_else(unplanned)?;
-        turns.extend(found.0.iter().flat_map(rows_of));
+    for (poses, joints) in poses.iter().zip(&joints) {
+        let (poses, joints) = (poses_of(poses), points_of(joints));
+        let found = bones(&body.0, &poses, &joints, own).ok_or_else(unplanned)?;
+        turns.extend(found.0.iter().flat_map(|turn| turn.transpose().to_cols_array()));
         heads.extend(found.1.iter().flat_map(Vec3::to_array));
     }
-    let (count, limbs) = (poses.len(), bodies.first().map_or(0, |body| body.0.limbs().len()));
+    let (count, limbs) = (poses.len(), body.0.limbs().len());
     Ok((array(py, turns, &[count, limbs, 3, 3])?, array(py, heads, &[count, limbs, 3])?))
-}
-
-#[doc = stub!("placed")]
-#[pyfunction]
-pub(crate) fn placed<'py>(
-    py: Python<'py>,
-    rotations: Given<'py>,
-    points: Given<'py>,
-    plan: Plan<'py>,
-) -> PyResult<(Array<'py>, Array<'py>)> {
-    let (rotations, points) = (frames("rotations", &rotations)?, frames("points", &points)?);
-    let plan = self::plan(&plan)?;
-    let (mut places, mut rows) = (Vec::new(), Vec::new());
-    for (rotations, points) in rotations.iter().zip(&points) {
-        let turns: Vec<_> = rotations.iter().map(rotation).collect();
-        let points: Vec<_> = points.iter().copied().map(Vec3::from_array).collect();
-        let found = placed_frames(&turns, &points, plan).ok_or_else(unplanned)?;
-        places.extend(found.0.iter().flat_map(Vec3::to_array));
-        rows.extend(found.1.into_iter().flatten());
-    }
-    let (count, all) = (points.len(), plan.len());
-    Ok((array(py, places, &[count, all, 3])?, array(py, rows, &[count, all, 7])?))
-}
-
-#[doc = stub!("joint_angles")]
-#[pyfunction]
-pub(crate) fn joint_angles<'py>(py: Python<'py>, rotations: Given<'py>, plan: Plan<'py>) -> PyResult<Array<'py>> {
-    let (rotations, plan) = (frames("rotations", &rotations)?, self::plan(&plan)?);
-    let mut all = Vec::new();
-    for rotations in &rotations {
-        let turns: Vec<_> = rotations.iter().map(rotation).collect();
-        all.extend(angles(&turns, plan).ok_or_else(unplanned)?);
-    }
-    array(py, all, &[rotations.len(), plan.len()])
-}
-
-#[doc = stub!("moved_covariances")]
-#[pyfunction]
-pub(crate) fn moved_covariances<'py>(
-    py: Python<'py>,
-    covariances: Given<'py>,
-    across: PyReadonlyArray2<'py, f64>,
-) -> PyResult<Array<'py>> {
-    let covariances = frames::<6>("covariances", &covariances)?;
-    let mut moved = Vec::new();
-    for (covariance, across) in covariances.iter().zip(across.as_array().rows()) {
-        let (Ok(covariance), &[x, y, z]) = ((*covariance).try_into(), &across.to_vec()[..]) else {
-            return Err(wrong("covariances", "shapes (F, 6, 6) and (F, 3)"));
-        };
-        moved.extend(moved_covariance(covariance, &Mat3::IDENTITY, Vec3::new(x, y, z)).into_iter().flatten());
-    }
-    array(py, moved, &[covariances.len(), 6, 6])
-}
-
-#[doc = stub!("cylinders")]
-#[pyfunction]
-pub(crate) fn cylinders<'py>(
-    py: Python<'py>,
-    bodies: Vec<PyRef<'py, PyBody>>,
-    poses: Given<'py>,
-) -> PyResult<Array<'py>> {
-    let poses = frames("poses", &poses)?;
-    let limbs = bodies.first().map_or(0, |body| body.0.limbs().len());
-    let mut rows = Vec::new();
-    for (poses, body) in poses.iter().zip(each(&bodies)) {
-        rows.extend(body.limbs().iter().zip(*poses).flat_map(|(limb, pose)| cylinder(limb, &parts(pose))));
-    }
-    array(py, rows, &[poses.len(), limbs * 12])
 }
 
 /// The leading axes of an array that ends with the given ones.
@@ -254,7 +182,7 @@ pub(crate) fn quaternions<'py>(py: Python<'py>, rotations: Given<'py>) -> PyResu
     let shape = [leading(&rotations, &[3, 3])?, &[4]].concat();
     let (mut found, mut skewed) = (Vec::with_capacity(shape.iter().product()), false);
     for rows in rotations.as_slice()?.as_chunks::<9>().0 {
-        let matrix = Mat3::from_cols_array(rows).transpose();
+        let matrix = rotation(rows);
         found.extend(math::quaternion(&matrix));
         skewed |= math::is_skewed(&matrix);
     }

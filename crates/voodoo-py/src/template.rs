@@ -33,14 +33,6 @@ fn put(messages: &mut [u8], at: usize, bytes: &[u8]) {
     }
 }
 
-fn put_number(messages: &mut [u8], at: usize, number: f64, single: bool) {
-    if single {
-        put(messages, at, &(number as f32).to_be_bytes());
-    } else {
-        put(messages, at, &number.to_le_bytes());
-    }
-}
-
 /// The numbers of arrays in their order, however they are stored.
 fn all(parts: &[PyReadonlyArrayDyn<'_, f64>]) -> Vec<f64> {
     let mut all = Vec::with_capacity(parts.iter().map(|part| part.len()).sum());
@@ -88,8 +80,11 @@ impl Template {
         unless(all.len() == self.count, "numbers", self.count, all.len())?;
         let mut messages = self.messages.clone();
         for &(at, number) in &self.places {
-            let number = all.get(number).copied().unwrap_or(f64::NAN);
-            put_number(&mut messages, at, number, self.single);
+            if self.single {
+                put(&mut messages, at, &(all[number] as f32).to_be_bytes());
+            } else {
+                put(&mut messages, at, &all[number].to_le_bytes());
+            }
         }
         for at in &self.stamps {
             put(&mut messages, *at, stamp);

@@ -27,18 +27,16 @@ pub fn carried(
     world_from_sensor: Option<&Affine3>,
 ) -> Result<Option<Vec<Vec3>>, TrackError> {
     let Some(motion) = tracker.limb_motion().filter(|_| elapsed.abs() >= SAME_TIME) else { return Ok(None) };
-    let (elapsed, fraction) = (elapsed.clamp(-LONGEST, LONGEST), tracker.config().prediction);
-    let carrying = Carrying { motion, elapsed, fraction };
     let mut moved: Vec<Vec3> = (0..points.len()).map(|index| points.get(index)).collect();
     if let Some(pose) = world_from_sensor {
         moved.iter_mut().for_each(|point| *point = pose.transform_point3(*point));
     }
-    let around = carrying.around(&moved);
+    let around = around(&moved, &motion);
     if !around.is_empty() {
         let chosen: Vec<[f64; 3]> = around.iter().map(|index| moved[*index].to_array()).collect();
         let away = tracker.limb_distances(PointSlice::F64(&chosen))?;
         if away.len() == motion.now.len() {
-            carrying.carry(&mut moved, &around, &away);
+            carry(&mut moved, &around, &away, &motion, [elapsed.clamp(-LONGEST, LONGEST), tracker.config().prediction]);
         }
     }
     if let Some(pose) = world_from_sensor {
@@ -47,54 +45,42 @@ pub fn carried(
     Ok(Some(moved))
 }
 
-/// Motion of the limbs, and the parameters of the extrapolation.
-#[derive(Clone, Copy, Debug)]
-struct Carrying<'a> {
-    motion: LimbMotion<'a>,
-    /// Time of extrapolation, seconds.
-    elapsed: f64,
-    /// Factor applied to the limbs' velocity.
-    fraction: f64,
+/// Which points may be on a limb.
+fn around(points: &[Vec3], motion: &LimbMotion) -> Vec<usize> {
+    let origins = Aabb::from_points(motion.now.iter().map(|pose| pose.translation));
+    let within =
+        |place: Vec3| place.cmpgt(origins.mins - LONGEST_LIMB).all() && place.cmplt(origins.maxs + LONGEST_LIMB).all();
+    (0..points.len()).filter(|index| within(points[*index])).collect()
 }
 
-impl Carrying<'_> {
-    /// Which points may be on a limb.
-    fn around(&self, points: &[Vec3]) -> Vec<usize> {
-        let origins = Aabb::from_points(self.motion.now.iter().map(|pose| pose.translation));
-        let within = |place: Vec3| {
-            place.cmpgt(origins.mins - LONGEST_LIMB).all() && place.cmplt(origins.maxs + LONGEST_LIMB).all()
-        };
-        (0..points.len()).filter(|index| within(points[*index])).collect()
-    }
-
-    /// Moves the points that may be on a limb, given for each limb their distances from it, meters.
-    fn carry(&self, points: &mut [Vec3], around: &[usize], away: &[Vec<f32>]) {
-        let changes: Vec<Affine3> = (0..away.len()).map(|limb| self.change(limb)).collect();
-        for (column, &index) in around.iter().enumerate() {
-            let mut nearest = (0, f32::INFINITY);
-            for (limb, away) in away.iter().enumerate() {
-                nearest = if away[column] < nearest.1 { (limb, away[column]) } else { nearest };
-            }
-            if f64::from(nearest.1) >= NEAR {
-                continue;
-            }
-            let velocity = changes[nearest.0].transform_point3(points[index]);
-            if velocity.length() < FASTEST_LIMB * self.fraction {
-                points[index] += self.elapsed * velocity;
-            }
+/// Moves the points that may be on a limb, given for each limb their distances from it, meters: for some time, in seconds, with a
+/// fraction of the limb's velocity.
+fn carry(points: &mut [Vec3], around: &[usize], away: &[Vec<f32>], motion: &LimbMotion, [elapsed, fraction]: [f64; 2]) {
+    let changes: Vec<Affine3> = (0..away.len()).map(|limb| change(motion, limb, fraction)).collect();
+    for (column, &index) in around.iter().enumerate() {
+        let mut nearest = (0, f32::INFINITY);
+        for (limb, away) in away.iter().enumerate() {
+            nearest = if away[column] < nearest.1 { (limb, away[column]) } else { nearest };
+        }
+        if f64::from(nearest.1) >= NEAR {
+            continue;
+        }
+        let velocity = changes[nearest.0].transform_point3(points[index]);
+        if velocity.length() < FASTEST_LIMB * fraction {
+            points[index] += elapsed * velocity;
         }
     }
+}
 
-    /// Rate of change of a limb's transform over the last interval (world from world), per second.
-    fn change(&self, limb: usize) -> Affine3 {
-        let [now, then] = [self.motion.now, self.motion.before]
-            .map(|poses| Affine3::from_rotation_translation(poses[limb].rotation, poses[limb].translation));
-        let turned = now.matrix3 * then.matrix3.transpose();
-        let shift = now.translation - turned * then.translation;
-        let scale = |value: f64| value / self.motion.interval * self.fraction;
-        let columns = (turned - Mat3::IDENTITY).to_cols_array().map(scale);
-        Affine3::from_mat3_translation(Mat3::from_cols_array(&columns), Vec3::from_array(shift.to_array().map(scale)))
-    }
+/// Rate of change of a limb's transform over the last interval (world from world), per second, times a fraction.
+fn change(motion: &LimbMotion, limb: usize, fraction: f64) -> Affine3 {
+    let [now, then] = [motion.now, motion.before]
+        .map(|poses| Affine3::from_rotation_translation(poses[limb].rotation, poses[limb].translation));
+    let turned = now.matrix3 * then.matrix3.transpose();
+    let shift = now.translation - turned * then.translation;
+    let scale = |value: f64| value / motion.interval * fraction;
+    let columns = (turned - Mat3::IDENTITY).to_cols_array().map(scale);
+    Affine3::from_mat3_translation(Mat3::from_cols_array(&columns), Vec3::from_array(shift.to_array().map(scale)))
 }
 
 #[cfg(test)]
@@ -107,20 +93,20 @@ mod tests {
         let pose = |angle: f64, x: f64| Pose::new(Vec3::new(x, 1.0, 0.0), Vec3::Z * angle);
         let (now, before) = ([pose(0.3, 0.03)], [pose(0.3, 0.0)]);
         let motion = LimbMotion { now: &now, before: &before, interval: 0.1 };
-        let carrying = Carrying { motion, elapsed: 0.05, fraction: 1.0 };
+        let how = [0.05, 1.0];
         let points = [Vec3::new(0.1, 1.0, 0.0), Vec3::new(0.0, 0.2, 0.0), Vec3::splat(5.0)];
-        assert_eq!(carrying.around(&points), [0, 1]);
+        assert_eq!(around(&points, &motion), [0, 1]);
         let mut moved = points;
-        carrying.carry(&mut moved, &[0, 1], &[vec![0.1, 0.3]]);
+        carry(&mut moved, &[0, 1], &[vec![0.1, 0.3]], &motion, how);
         assert!((moved[0].x - 0.115).abs() < 1e-12 && moved[1..] == points[1..]);
         let turned = [pose(0.35, 0.0)];
-        let turning = Carrying { motion: LimbMotion { now: &turned, ..motion }, ..carrying };
+        let turning = LimbMotion { now: &turned, ..motion };
         let mut moved = points;
-        turning.carry(&mut moved, &[0], &[vec![0.1]]);
+        carry(&mut moved, &[0], &[vec![0.1]], &turning, how);
         assert!((moved[0].y - 1.0 - 0.5 * 0.1 * 0.05_f64.sin()).abs() < 1e-12);
         let far = [pose(0.3, 0.83)];
         let mut jumped = points;
-        Carrying { motion: LimbMotion { now: &far, ..motion }, ..carrying }.carry(&mut jumped, &[0], &[vec![0.1]]);
+        carry(&mut jumped, &[0], &[vec![0.1]], &LimbMotion { now: &far, ..motion }, how);
         assert_eq!(jumped, points);
     }
 }

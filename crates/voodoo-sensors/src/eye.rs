@@ -48,18 +48,14 @@ impl Eye<'_> {
         self.camera.project(place).unwrap_or([f64::NAN; 2])
     }
 
-    /// `(x/z, y/z)` of a pixel; NaN where the lens model has no ray for it.
-    pub fn undistorted(&self, pixel: [f64; 2]) -> [f64; 2] {
-        self.camera.ray(pixel).unwrap_or([f64::NAN; 2])
-    }
-
     /// Position in the world at `(x/z, y/z)` and the depth z, meters.
     pub fn place(&self, [x, y]: [f64; 2], z: f64) -> Vec3 {
         self.origin() + z * (self.world_from_sensor.matrix3 * Vec3::new(x, y, 1.0))
     }
 
-    /// Unit vector in the world through `(x/z, y/z)`.
-    pub fn direction(&self, [x, y]: [f64; 2]) -> Vec3 {
+    /// Unit vector in the world through a pixel; NaN where the lens model has no ray for it.
+    pub fn direction(&self, pixel: [f64; 2]) -> Vec3 {
+        let [x, y] = self.camera.ray(pixel).unwrap_or([f64::NAN; 2]);
         (self.world_from_sensor.matrix3 * Vec3::new(x, y, 1.0)).normalize()
     }
 
@@ -87,7 +83,7 @@ mod tests {
         let place = Vec3::new(2.5, 0.3, 1.7);
         let inside = eye.in_sensor(place);
         assert!((inside - Vec3::new(-0.3, -0.5, 2.0)).length() < 1e-12);
-        let direction = eye.direction(eye.undistorted(eye.pixel(inside)));
+        let direction = eye.direction(eye.pixel(inside));
         let found = eye.origin() + direction * (inside.z / direction.dot(eye.axis()));
         assert!((found - place).length() < 1e-12);
     }

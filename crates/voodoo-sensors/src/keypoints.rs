@@ -93,7 +93,7 @@ impl SiteKeypoints {
         mut gate: Option<&mut SiteGate>,
     ) -> SiteMeasurement {
         let (eye, expected) = (&sensor.eye, observation.expected);
-        let direction = eye.direction(eye.undistorted(observation.pixel.pixel));
+        let direction = eye.direction(observation.pixel.pixel);
         let depth = eye.in_sensor(expected).z;
         let away = eye.distance_from_ray(expected, direction);
         if !(depth > 0.0 && away >= 0.0) {

@@ -91,6 +91,63 @@ class DetectedPerson:
     floor: tuple[Sequence[float], float] | None = None
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Detection:
+    """A person in a depth image, as `voodoo.Detector` reports it. World frame, meters; probabilities from 0 to 1.
+
+    Args:
+        joints: joint name -> position (3,); `l_` and `r_` are the person's own.
+        joint_sigma: joint name -> standard deviation along each axis.
+        visible: joint name -> probability that it is in the image and not occluded.
+        lengths: upper arm, forearm, thigh, shank, shoulder and hip width, trunk, neck and stature.
+        length_sigma: names as in `lengths` -> standard deviation.
+        stature: height of the person when standing upright.
+        facing: probability that the front of the trunk faces the camera.
+        confidence: probability that it is a person.
+        source: source name of the depth image in which it was detected.
+        mask: the person's pixels (H, W) in that image.
+        floor: ground plane, detected or given by the frame: unit normal (3,) upwards and height along it; or None.
+    """
+
+    joints: dict[str, npt.NDArray[np.float64]]
+    joint_sigma: dict[str, float]
+    visible: dict[str, float]
+    lengths: dict[str, float]
+    length_sigma: dict[str, float]
+    stature: float
+    facing: float
+    confidence: float
+    source: str
+    mask: npt.NDArray[np.bool_]
+    floor: tuple[Sequence[float], float] | None
+
+    def __repr__(self) -> str:
+        """Summary in numbers."""
+        return (
+            f'Detection(source="{self.source}", confidence={self.confidence:.2f}, facing={self.facing:.2f}, '
+            f"stature={self.stature:.2f})"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class PersonCandidate:
+    """A person candidate in a depth image, with the crop that is the network's input. Camera frame, meters.
+
+    Args:
+        crop: input of the network (2, 96, 96): depth relative to the center, scaled so that +-1.2 m is +-1, and the mask.
+        mask: its pixels (H, W) in the depth image.
+        middle: center of the crop: (x/z, y/z) in the camera rotated by `roll`, and the depth.
+        roll: rotation of the camera about its optical axis that makes the vertical point up in the image [rad].
+        floor: normal and offset of the ground plane, given or detected.
+    """
+
+    crop: npt.NDArray[np.float32]
+    mask: npt.NDArray[np.bool_]
+    middle: Sequence[float]
+    roll: float
+    floor: tuple[Sequence[float], float] | None
+
+
 class PersonDetector(Protocol):
     """Interface of objects that detect persons in depth images for a tracker.
 

@@ -5,17 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.detectors.base import JOINTS, DetectedPerson, DetectorImage, names_of
+from voodoo.detectors.base import JOINTS, DetectedPerson, DetectorImage, PersonCandidate, names_of
 from voodoo.errors import ConfigError, a_path, installed
 from voodoo.stored import MOST_RECORDED, check_stored
-
-if TYPE_CHECKING:
-    from voodoo._core import PersonCandidate
 
 SIZE = 96
 """Edge length [px] of the image crops that a network takes."""

@@ -7,15 +7,14 @@ from functools import lru_cache
 from itertools import accumulate, islice
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TypeAlias
-
-import numpy as np
+from typing import Any
 
 import voodoo._core as _core
 from voodoo.errors import installed
 from voodoo.export.conventions import JOINT_COLOR, limb_color
-from voodoo.export.human_frames import human_frames, placed_names
-from voodoo.export.skeleton import FloatArray, skeleton
+from voodoo.export.human_frames import placed_names
+from voodoo.export.layout import FoxgloveAbout, rows_of
+from voodoo.export.skeleton import FloatArray
 from voodoo.export.template import STAMP_NS, template
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, upright
@@ -26,8 +25,6 @@ SUFFIX = ".foxglove.mcap"
 TRANSFORMS, SCENE = "/tf", "/people"
 """Topics: foxglove.FrameTransforms and foxglove.SceneUpdate."""
 _JOINT_M = 0.04
-FoxgloveAbout: TypeAlias = tuple[tuple[str, ...], tuple[int, ...], tuple[str, ...], int, int]
-"""Of a person names and parents of `HumanFrames`, names of limbs, number of joints and sites, and of all given numbers."""
 
 
 def library(wanted: object) -> ModuleType:
@@ -72,8 +69,8 @@ class Channels:
         numbers: Sequence[FloatArray],
         root_frame: str,
     ) -> None:
-        """Write a frame of those who are there, by their REP-155 ids; `root_frame` has z up. The numbers of each begin with
-        `HumanFrames.on_parents` and `shapes_of`."""
+        """Write a frame of those who are there, by their REP-155 ids; `root_frame` has z up. The numbers of each are those
+        of a row of `Layout`."""
         at = round(stamp * 1e9)
         made = self._template_of(tuple(people), tuple(about), root_frame)
         *transforms, scene = made.filled(numbers, _timestamp(*divmod(at, 1_000_000_000)))
@@ -122,19 +119,6 @@ class Channels:
         return template(encode, ends[-1], stamp=_timestamp(*divmod(STAMP_NS, 1_000_000_000)))
 
 
-def shapes_of(bodies: Sequence[Body], limb_poses: FloatArray, joints: FloatArray) -> FloatArray:
-    """Numbers of the shapes (F, 12 L + 3 J): of each limb's cylinder middle, rotation, size, and scales of both ends; joints.
-
-    Args:
-        bodies: one, or one of each of the F poses.
-        limb_poses: (F, L, 4, 4).
-        joints: (F, J, 3).
-    """
-    poses = np.ascontiguousarray(limb_poses, dtype=np.float64)
-    cylinders = _core.cylinders([body.core for body in bodies], poses)
-    return np.concatenate([cylinders, joints.reshape(len(joints), 3 * joints.shape[1])], axis=1)
-
-
 def _timestamp(seconds: int, nanoseconds: int) -> bytes:
     """Fields of google.protobuf.Timestamp, always of the same length: seven bits a byte, the highest says that more follow."""
     s, n = seconds, nanoseconds
@@ -172,17 +156,14 @@ def write_foxglove(
     for person, (track, body) in people.items():
         track, root = upright(track, root_frame, turn)
         found = track.of_frames(track.found)
-        placed = human_frames(track.joint_names, found.joints, skeleton(found, body))
-        shapes = shapes_of([body], found.world_from_limb, found.joints)
-        width = 7 * len(placed.names) + shapes.shape[1]
-        about = placed.names, placed.parents, track.limb_names, len(track.joint_names), width
-        rows = zip(placed.on_parents, shapes, strict=True)
+        layout, found_rows = rows_of(found, body)
+        rows = iter(found_rows)
         for stamp, there in zip(track.stamps.tolist(), track.found.tolist(), strict=True):
             persons, abouts, numbers = frames.setdefault(stamp, ([], [], []))
             if there:
                 persons.append(person)
-                abouts.append(about)
-                numbers.extend(next(rows))
+                abouts.append(layout.shapes)
+                numbers.append(next(rows))
     with appearing_whole(Path(path)) as place, foxglove.open_mcap(str(place), context=context):
         for stamp in sorted(frames):
             channels.log(stamp, *frames[stamp], root)

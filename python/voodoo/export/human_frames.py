@@ -1,44 +1,19 @@
-"""Frames of REP-155 on a tracked body: names, parents and poses; and joint angles in the convention of ROS4HRI's
-human_description, from the rotations of the bones."""
+"""Frames of REP-155 on a tracked body, and joint angles in the convention of ROS4HRI's human_description: names, and how they are
+found."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-import voodoo._core as _core
 from voodoo.export.conventions import NAMES
-from voodoo.export.skeleton import FloatArray, Skeleton
+from voodoo.export.skeleton import FloatArray
 
 FRAMES = {limb: names.rep155 for limb, names in NAMES.items() if names.rep155}
 """REP-155 frame of each limb of the default humans; other limbs (the neck) keep their own name."""
-
-
-class HumanFrames(NamedTuple):
-    """Frames of F poses: N a pose, parents first.
-
-    Attributes:
-        names: N names without that of the person; the first is "body".
-        parents: N numbers of the parent; -1 of the first one, which is on the root frame.
-        places: (F, N, 3) [m] in the root frame.
-        on_parents: (F, N, 7): place x, y, z [m] and rotation x, y, z, w of each frame on its parent.
-    """
-
-    names: tuple[str, ...]
-    parents: tuple[int, ...]
-    places: FloatArray
-    on_parents: FloatArray
-
-
-def human_frames(joint_names: tuple[str, ...], joints: FloatArray, posed: Skeleton) -> HumanFrames:
-    """Frames of poses with joints (F, J, 3)."""
-    names, parents, plan = frame_plan(joint_names, posed.body.limb_tree)
-    points = np.concatenate([posed.heads, joints], axis=1)
-    return HumanFrames(names, parents, *_core.placed(posed.rotations, points, plan))
 
 
 def placed_names(names: Sequence[str], parents: Sequence[int], person: str, root: str) -> list[tuple[str, str]]:
@@ -51,8 +26,9 @@ def placed_names(names: Sequence[str], parents: Sequence[int], person: str, root
 def frame_plan(
     joint_names: tuple[str, ...], limbs: tuple[tuple[str, int | None], ...]
 ) -> tuple[tuple[str, ...], tuple[int, ...], npt.NDArray[np.int64]]:
-    """Of each frame the name; the parent; and the plan of `placed`: the limb it turns with, two points in the middle of which it
-    is (heads of limbs, then joints), and the parent."""
+    """Of each frame the name without that of the person; the parent, -1 of the first one, which is on the root frame; and the row
+    of the plan of `_core.Layout`: the limb it turns with, two points in the middle of which it is (heads of limbs, then joints),
+    and the parent."""
     sites = {name: len(limbs) + index for index, name in enumerate(joint_names)}
     there = {name for name, _ in limbs}
 
@@ -82,26 +58,25 @@ def frame_plan(
     return tuple(row[0] for row in rows), tuple(row[-1] for row in rows), np.array([row[1:] for row in rows])
 
 
+def frame_places(plan: npt.NDArray[np.int64], heads: FloatArray, joints: FloatArray) -> FloatArray:
+    """Places (F, N, 3) [m] of the frames of a plan, of heads (F, L, 3) and joints (F, J, 3)."""
+    points = np.concatenate([heads, joints], axis=1)
+    return (points[:, plan[:, 1]] + points[:, plan[:, 2]]) / 2.0
+
+
 _TWIST, _HEAD, _SHOULDER, _HIP = (-1, -1, -1), (0, 2, 1), (2, 0, 2), (2, 0, 1)
 """Moving axes of Euler angles (x, y, z), or the twist about y."""
 
 
-def joint_angles(posed: Skeleton) -> tuple[tuple[str, ...], FloatArray]:
-    """Names of the joints that the body has, and their angles (F, N) [rad].
+@lru_cache(maxsize=16)
+def angle_plan(limbs: tuple[str, ...]) -> tuple[tuple[str, ...], npt.NDArray[np.int64]]:
+    """Names of the joints that limbs have, and how their angles are found, see `_core.Layout`.
 
     Shoulder: R = Rz(-s y) Rx(s p) Rz(s r); hip: R = Rz(-y) Rx(s p) Ry(-r); head: R = Rx(r) Rz(y) Ry(-p), with s = 1
     on the left, -1 on the right, R = parent_from_child. Elbow and knee: the rotation about the axis -y; elbows flex to
     positive, knees to negative angles. The rest of their rotation is not in the angle (it is in /tf). The waist
-    is 0: the torso is one limb.
+    is 0: the torso is one limb. For a hanging arm, where Euler angles are singular, the third one is zero.
     """
-    names, plan = angle_plan(posed.body.limb_names)
-    # Singular for a hanging arm; the third angle is then set to zero, which is one valid solution.
-    return names, _core.joint_angles(posed.rotations, plan)
-
-
-@lru_cache(maxsize=16)
-def angle_plan(limbs: tuple[str, ...]) -> tuple[tuple[str, ...], npt.NDArray[np.int64]]:
-    """Names of joints, and how their angles are found."""
     numbers, rows = {limb: number for number, limb in enumerate(limbs)}, turns_of(limbs)
     # On the right they are the other of the two solutions, so that abduction is positive on both sides.
     other = {"r_y_shoulder": 1, "r_p_shoulder": -1, "r_r_shoulder": 1}

@@ -21,12 +21,12 @@ from rosbags.interfaces import Nodetype
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-import voodoo._core as _core
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
 from voodoo.export.conventions import JOINT_COLOR, Color, limb_color
-from voodoo.export.human_frames import human_frames, joint_angles, placed_names
-from voodoo.export.skeleton import FloatArray, ellipsoids, skeleton
+from voodoo.export.human_frames import placed_names
+from voodoo.export.layout import rows_of
+from voodoo.export.skeleton import FloatArray, ellipsoids
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, by_axes, upright
 from voodoo.export.urdf import urdf
@@ -207,14 +207,10 @@ class _Human:
             raise VoodooError(f"stamps: expected none before zero, as a bag wants it, found {track.stamps.min()} s")
         self._displayed = track.found
         if self._displayed.any():
-            posed = skeleton(track, body).of_frames(self._displayed)
-            frames = human_frames(track.joint_names, track.joints[self._displayed], posed)
-            self._joints, angles = joint_angles(posed)
-            self._frames = placed_names(frames.names, frames.parents, person, self.root)
-            roots = track.world_from_limb[self._displayed, 0, :3, 3]
-            known = np.ascontiguousarray(track.root_covariance[self._displayed], dtype=np.float64)
-            sure = _core.moved_covariances(known, frames.places[:, 0] - roots)
-            self._rows = zip(angles, frames.on_parents, sure, strict=True)
+            layout, rows = rows_of(track.of_frames(self._displayed), body)
+            frames, *_, angles, sure, _ = layout.parts(rows)
+            self._joints, self._frames = layout.angles, placed_names(*layout.shapes[:2], person, self.root)
+            self._rows = zip(angles, frames, sure, strict=True)
 
     def kinds(self) -> dict[str, str]:
         """Topics and types of the messages, without /tf."""
@@ -241,7 +237,7 @@ class _Human:
 
 
 def root_on_parent(pose: FloatArray) -> list[float]:
-    """Place and rotation, as in `HumanFrames.on_parents`, of the upright frame on the root frame that `pose` turns."""
+    """Place and rotation, as in the rows of `Layout`, of the upright frame on the root frame that `pose` turns."""
     return [*(-pose[:3, :3].T @ pose[:3, 3]).tolist(), *quaternions(pose[:3, :3].T).tolist()]
 
 

@@ -7,7 +7,6 @@ rest.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TypeAlias
@@ -70,7 +69,7 @@ class Skeleton:
     """A track on its bones: F frames, L bones.
 
     Args:
-        body: whose bones they are; persons of one instant may have other sizes each.
+        body: whose bones they are.
         stamps: (F,) [s].
         rotations: (F, L, 3, 3) world_from_bone: the identity when the body stands at rest and looks along x.
         heads: (F, L, 3) where each bone is joined to its parent [m]: the track's own joint of that name, else the place on the
@@ -117,19 +116,28 @@ def skeleton(track: Track, body: Body) -> Skeleton:
     Raises:
         VoodooError: the track has no limb poses (it was read from a .csv), or is of another body.
     """
+    check_limbs(track, body)
+    return skeleton_of(body, track.stamps, track.world_from_limb, track.joint_names, track.joints)
+
+
+def check_limbs(track: Track, body: Body) -> None:
+    """Check that a track has poses of the limbs of a body.
+
+    Raises:
+        VoodooError: it has none (it was read from a .csv), or those of another body.
+    """
     if track.limb_names != body.limb_names:
         found = ", ".join(track.limb_names) or "none (a .csv has no limb poses; use .npz)"
         raise VoodooError(f"track: expected poses of the limbs {', '.join(body.limb_names)}, found {found}")
-    return skeleton_of([body], track.stamps, track.world_from_limb, track.joint_names, track.joints)
 
 
 def skeleton_of(
-    bodies: Sequence[Body], stamps: FloatArray, poses: FloatArray, joint_names: tuple[str, ...], joints: FloatArray
+    body: Body, stamps: FloatArray, poses: FloatArray, joint_names: tuple[str, ...], joints: FloatArray
 ) -> Skeleton:
-    """The skeleton of F poses (F, L, 4, 4) with joints (F, J, 3) of a body, or of persons of one instant with a body each."""
+    """The skeleton of F poses (F, L, 4, 4) with joints (F, J, 3) of a body."""
     poses, joints = (np.ascontiguousarray(one, dtype=np.float64) for one in (poses, joints))
-    own = own_joints(bodies[0].limb_joints, joint_names)
-    return Skeleton(bodies[0], stamps, *_core.skeleton([body.core for body in bodies], poses, joints, own))
+    own = own_joints(body.limb_joints, joint_names)
+    return Skeleton(body, stamps, *_core.skeleton(body.core, poses, joints, own))
 
 
 @lru_cache(maxsize=64)

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.export.human_frames import FRAMES, human_frames, turns_of
+from voodoo.export.human_frames import FRAMES, frame_places, frame_plan, turns_of
 from voodoo.export.skeleton import bones, skeleton_of
 from voodoo.model.body import Body
 from voodoo.model.rotations import euler_angles
@@ -33,9 +33,9 @@ def urdf(body: Body, person: str) -> str:
     estimate = Tracker(body, detector=None).reset_pose(rest)
     names, limb_names = estimate.joint_names, estimate.limb_names
     joints_at_rest = estimate.joint_positions[None]
-    posed = skeleton_of([body], np.zeros(1), estimate.limb_poses[None], names, joints_at_rest)
-    frames = human_frames(names, joints_at_rest, posed)
-    ids, places = [f"{name}_{person}" for name in frames.names], frames.places[0]
+    posed = skeleton_of(body, np.zeros(1), estimate.limb_poses[None], names, joints_at_rest)
+    frames, parents, plan = frame_plan(names, body.limb_tree)
+    ids, places = [f"{name}_{person}" for name in frames], frame_places(plan, posed.heads, joints_at_rest)[0]
     joints: dict[str, list[tuple[str, npt.NDArray[np.float64]]]] = {}
     for joint, _, limb, axes, which, sign in turns_of(limb_names):
         axis = sign * np.eye(3)[axes[which] if axes[which] >= 0 else 1]
@@ -43,7 +43,7 @@ def urdf(body: Body, person: str) -> str:
     robot = ElementTree.Element("robot", name=f"human_{person}")
     limbs = {f"{FRAMES.get(limb.name, limb.name)}_{person}": limb for limb in body.limbs}
     heads = {f"{FRAMES.get(limb, limb)}_{person}": head for limb, head in zip(limb_names, posed.heads[0], strict=True)}
-    for number, (name, parent) in enumerate(zip(ids, frames.parents, strict=True)):
+    for number, (name, parent) in enumerate(zip(ids, parents, strict=True)):
         link = ElementTree.SubElement(robot, "link", name=name)
         if name in limbs:
             shape, place = limbs[name].shape, rest[limbs[name].name]

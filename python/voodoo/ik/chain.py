@@ -40,10 +40,11 @@ class Chain:
         if not isinstance(root, str) or root not in ("free", "fixed"):
             raise MeasurementError(f'root: expected "free" or "fixed", found {short(root)}')
         self.core: _core.Chain = _core.Chain(body.core, list(limbs), root == "free")
-        self.angle_names: tuple[str, ...] = tuple(self.core.angle_names)
-        self.limb_names: tuple[str, ...] = tuple(self.core.limb_names)
-        self.site_names: tuple[str, ...] = tuple(self.core.site_names)
-        self.limits: FloatArray = np.array(self.core.limits, dtype=np.float64).reshape(-1, 2)
+        angle_names, limits, limb_names, site_names = self.core.parts()
+        self.angle_names: tuple[str, ...] = tuple(angle_names)
+        self.limb_names: tuple[str, ...] = tuple(limb_names)
+        self.site_names: tuple[str, ...] = tuple(site_names)
+        self.limits: FloatArray = np.array(limits, dtype=np.float64).reshape(-1, 2)
         self.limits.setflags(write=False)
 
     def rest(self) -> FloatArray:

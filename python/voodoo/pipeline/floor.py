@@ -7,7 +7,8 @@ from itertools import islice
 
 import numpy as np
 
-from voodoo._core import Detection, Detector, Frame
+from voodoo._core import Detector, Frame
+from voodoo.detectors.base import Detection
 from voodoo.errors import VoodooError
 from voodoo.measurements import DepthImage, FloatArray, RecordedFrame
 from voodoo.recordings.recording import Recording

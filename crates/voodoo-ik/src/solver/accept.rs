@@ -10,7 +10,7 @@ impl IkSolver {
         let n = angles.len();
         let last = if image { count } else { count - 1 };
         self.propose(problem, angles, last, 1.0);
-        self.evaluate(problem);
+        self.evaluate(problem, image);
         let Some(failed) = self.first_failure(n, active, last) else {
             for level in 0..count {
                 // Slow progress indicates an unreachable goal, where less damping would overshoot.
@@ -31,7 +31,7 @@ impl IkSolver {
                 continue;
             }
             self.propose(problem, angles, failed, fraction);
-            self.evaluate(problem);
+            self.evaluate(problem, image);
             let above = Active { levels: count.min(failed + 1), image: image && failed == count, slack };
             if (fraction == 0.0 && slack) || self.first_failure(n, above, failed).is_none() {
                 return self.take_trial(angles);

@@ -7,7 +7,7 @@ mod step;
 
 use std::ops::Range;
 
-use super::goal::{Goal, level_cost, level_ranges};
+use super::goal::{Goal, level_cost};
 use super::image::Criterion;
 use super::linear::{Damped, Taken};
 use super::model::{ChainModel, Kinematics};
@@ -29,7 +29,6 @@ const STALLED_STEPS: usize = 3;
 
 /// Solver parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
 pub struct SolverOptions {
     /// Maximum number of steps; J10 uses 15.
     pub steps: usize,
@@ -68,7 +67,7 @@ pub struct Report {
     pub h: f64,
 }
 
-/// Working memory, and the posture at rest. Nothing is allocated after the first call with a problem of the same size.
+/// Working memory. Nothing is allocated after the first call with a problem of the same size.
 #[derive(Clone, Debug, Default)]
 pub struct IkSolver {
     /// The current posture, and the trial posture.
@@ -86,10 +85,6 @@ pub struct IkSolver {
     saved_angles: Vec<f64>,
     saved_cost: Vec<f64>,
     report: Report,
-    /// Whether the current phase compares with the images.
-    comparing: bool,
-    /// Rest values that pull the angles below all other levels; empty: none.
-    rest: Vec<Rest>,
     /// Gradients of the criterion where the images rejected a step to rest.
     objections: Vec<f64>,
 }
@@ -138,52 +133,51 @@ struct Active {
     slack: bool,
 }
 
-struct IkProblem<'a> {
-    model: &'a ChainModel,
-    base: &'a Pose,
-    goals: &'a [Goal],
-    criterion: Option<&'a Criterion<'a>>,
-    options: &'a SolverOptions,
+/// What is to be solved.
+#[derive(Clone, Copy, Debug)]
+pub struct IkProblem<'a> {
+    /// The chain.
+    pub model: &'a ChainModel,
+    /// Pose of its base in the world.
+    pub base: Pose,
+    /// The goals, sorted by level. Those that cannot be reached, or contradict each other within a level, end at the minimum of
+    /// the weighted sum of squares.
+    pub goals: &'a [Goal],
+    /// The images, into whose silhouettes the bones are moved in the null space of the goals.
+    pub criterion: Option<&'a Criterion<'a>>,
+    /// Rest values that pull angles below all goals and the images: least squares of the differences.
+    pub rest: &'a [Rest],
+    /// Parameters.
+    pub options: SolverOptions,
 }
 
 impl IkSolver {
-    /// Moves `angles` towards the goals (sorted by level) and, in the null space of the goals, the bones into the silhouettes.
-    ///
-    /// Angles stay within the model's limits in every case; a start outside is clamped. Goals that cannot be reached, or
-    /// contradict each other within a level, end at the minimum of the weighted sum of squares.
-    pub fn solve(
-        &mut self,
-        model: &ChainModel,
-        world_from_base: &Pose,
-        goals: &[Goal],
-        criterion: Option<&Criterion>,
-        options: &SolverOptions,
-        angles: &mut [f64],
-    ) -> Report {
-        let criterion = criterion.filter(|criterion| !criterion.views.is_empty() && !criterion.segments.is_empty());
-        let problem = IkProblem { model, base: world_from_base, goals, criterion, options };
+    /// Moves `angles` to the solution of a problem. They stay within the model's limits in every case; a start outside is clamped.
+    pub fn solve(&mut self, problem: &IkProblem, angles: &mut [f64]) -> Report {
+        let shows = |criterion: &&Criterion| !criterion.views.is_empty() && !criterion.segments.is_empty();
+        let problem = IkProblem { criterion: problem.criterion.filter(shows), ..*problem };
         self.start(&problem, angles);
         let count = self.levels.ranges.len();
         // Levels join one after the other, the image last. Thus the result of a level does not depend on those below it.
-        for phase in 0..count + usize::from(criterion.is_some()) {
+        for phase in 0..count + usize::from(problem.criterion.is_some()) {
             // The images are evaluated only in their own phase, so that the levels above do not depend on them.
-            self.comparing = phase == count;
-            if self.comparing {
-                self.evaluate_here(&problem, angles);
+            let image = phase == count;
+            if image {
+                self.evaluate_here(&problem, image, angles);
             }
             angles.clone_into(&mut self.phase_start);
             self.phase(&problem, phase, true, angles);
-            if phase > 0 && !self.correct_upper_levels(&problem, phase.min(count), angles) {
+            if phase > 0 && !self.correct_upper_levels(&problem, phase.min(count), image, angles) {
                 // Finite steps along curved null spaces led to another local minimum: repeat, with no rise allowed at all.
                 angles.copy_from_slice(&self.phase_start);
-                self.evaluate_here(&problem, angles);
+                self.evaluate_here(&problem, image, angles);
                 self.phase(&problem, phase, false, angles);
             }
             if phase < count {
                 self.levels.best.push(self.here.cost[phase].sqrt());
             }
         }
-        if !self.rest.is_empty() {
+        if !problem.rest.is_empty() {
             self.pull_to_rest(&problem, angles);
         }
         self.report.h = self.here.h;
@@ -192,7 +186,7 @@ impl IkSolver {
 
     /// Steps with the first `phase + 1` levels, or with all levels and the image.
     fn phase(&mut self, problem: &IkProblem, phase: usize, slack: bool, angles: &mut [f64]) {
-        let (count, options) = (self.levels.ranges.len(), problem.options);
+        let (count, options) = (self.levels.ranges.len(), &problem.options);
         let image = phase == count;
         let active = if image { count } else { phase + 1 };
         let mut nudged = false;
@@ -218,21 +212,19 @@ impl IkSolver {
             }
             // Either a saddle (a stretched arm whose hand is to come nearer) or the optimum: a perturbation decides which.
             nudged = true;
-            self.nudge(problem, angles);
+            self.nudge(problem, image, angles);
         }
         if nudged && self.worse_than_saved() {
             angles.copy_from_slice(&self.saved_angles);
-            self.evaluate_here(problem, angles);
+            self.evaluate_here(problem, image, angles);
             rest = true;
         }
         self.report.converged &= rest;
     }
 
     /// Steps with the upper levels alone (at most as many as a phase has), to correct errors from the lower levels' finite steps.
-    /// Returns true when the upper levels are as good as before the phase.
-    fn correct_upper_levels(&mut self, problem: &IkProblem, levels: usize, angles: &mut [f64]) -> bool {
-        let comparing = self.comparing;
-        self.comparing = false;
+    /// Returns true when the upper levels are as good as before the phase. With `image` the result is compared with the images.
+    fn correct_upper_levels(&mut self, problem: &IkProblem, levels: usize, image: bool, angles: &mut [f64]) -> bool {
         let mut moved = false;
         for active in (1..=levels).rev() {
             for _ in 0..problem.options.steps {
@@ -246,9 +238,8 @@ impl IkSolver {
                 }
             }
         }
-        self.comparing = comparing;
-        if comparing && moved {
-            self.evaluate_here(problem, angles);
+        if image && moved {
+            self.evaluate_here(problem, image, angles);
         }
         self.here.cost.iter().zip(&self.levels.best).all(|(cost, best)| cost.sqrt() <= best + SETTLED)
     }
@@ -264,7 +255,11 @@ impl IkSolver {
             *angle = angle.clamp(*low, *high);
         }
         problem.model.normalize(angles);
-        level_ranges(problem.goals, &mut self.levels.ranges);
+        self.levels.ranges.clear();
+        for same in problem.goals.chunk_by(|a, b| a.level == b.level) {
+            let start = self.levels.ranges.last().map_or(0, |before| before.end);
+            self.levels.ranges.push(start..start + same.len());
+        }
         let count = self.levels.ranges.len();
         reset(&mut self.levels.trust, count, 0.1);
         reset(&mut self.levels.before, count, 0.0);
@@ -274,25 +269,25 @@ impl IkSolver {
         }
         reset(&mut self.stages, (count + 1) * n, 0.0);
         self.levels.best.clear();
-        (self.report, self.comparing) = (Report { converged: true, ..Report::default() }, false);
+        self.report = Report { converged: true, ..Report::default() };
         self.gain = problem.options.gain;
-        self.evaluate_here(problem, angles);
+        self.evaluate_here(problem, false, angles);
     }
 
-    fn evaluate_here(&mut self, problem: &IkProblem, angles: &[f64]) {
+    fn evaluate_here(&mut self, problem: &IkProblem, image: bool, angles: &[f64]) {
         self.trial_angles.copy_from_slice(angles);
-        self.evaluate(problem);
+        self.evaluate(problem, image);
         std::mem::swap(&mut self.here, &mut self.trial);
     }
 
-    /// Computes costs and kinematics at the trial angles, and the criterion in the image phase.
-    fn evaluate(&mut self, problem: &IkProblem) {
+    /// Computes costs and kinematics at the trial angles, and with `image` the criterion.
+    fn evaluate(&mut self, problem: &IkProblem, image: bool) {
         self.report.tried += 1;
-        problem.model.place(problem.base, &self.trial_angles, &mut self.trial.at);
+        problem.model.place(&problem.base, &self.trial_angles, &mut self.trial.at);
         let costs = self.levels.ranges.iter().map(|level| level_cost(&problem.goals[level.clone()], &self.trial.at));
         refill(&mut self.trial.cost, costs);
         self.trial.h = match problem.criterion {
-            Some(criterion) if self.comparing => {
+            Some(criterion) if image => {
                 self.report.compared += 1;
                 criterion.evaluate(problem.model, &self.trial.at, &mut self.trial.gradient)
             }
@@ -300,7 +295,7 @@ impl IkSolver {
         };
     }
 
-    fn nudge(&mut self, problem: &IkProblem, angles: &mut [f64]) {
+    fn nudge(&mut self, problem: &IkProblem, image: bool, angles: &mut [f64]) {
         angles.clone_into(&mut self.saved_angles);
         self.saved_cost.clone_from(&self.here.cost);
         for (i, (angle, [low, high])) in angles.iter_mut().zip(problem.model.limits()).enumerate() {
@@ -310,7 +305,7 @@ impl IkSolver {
             *angle = if *high - *angle < *angle - *low { *angle - by } else { *angle + by }.clamp(*low, *high);
         }
         self.levels.trust.fill(0.1);
-        self.evaluate_here(problem, angles);
+        self.evaluate_here(problem, image, angles);
     }
 
     fn worse_than_saved(&self) -> bool {

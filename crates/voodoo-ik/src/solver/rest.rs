@@ -20,11 +20,6 @@ pub struct Rest {
 }
 
 impl IkSolver {
-    /// A solver that pulls angles towards `rest`: least squares of the differences, in what goals and images leave free.
-    pub fn with_rest(rest: Vec<Rest>) -> Self {
-        Self { rest, ..Self::default() }
-    }
-
     /// Takes steps towards the rest posture, each corrected by the goals. A step that makes a goal or the images worse is
     /// rejected. Few solves have a rest posture, so the function is marked cold.
     #[cold]
@@ -44,7 +39,7 @@ impl IkSolver {
     fn pull_once(&mut self, problem: &IkProblem, most: f64, angles: &mut [f64]) -> f64 {
         let (n, count, limits) = (angles.len(), self.levels.ranges.len(), problem.model.limits());
         angles.clone_into(&mut self.phase_start);
-        let off = self.rest_error(angles);
+        let off = rest_error(problem, angles);
         self.objections.clear();
         self.objections.reserve((n + 1) * n);
         for refused in 0..=n {
@@ -57,14 +52,12 @@ impl IkSolver {
                     angles[i] = (self.phase_start[i] + fraction * self.stages[count * n + i]).clamp(*low, *high);
                 }
                 problem.model.normalize(angles);
-                self.comparing = false;
-                self.evaluate_here(problem, angles);
-                let kept = self.correct_upper_levels(problem, count, angles);
+                self.evaluate_here(problem, false, angles);
+                let kept = self.correct_upper_levels(problem, count, false, angles);
                 self.objections.truncate(refused * n);
-                if kept && self.rest_error(angles) < off {
+                if kept && rest_error(problem, angles) < off {
                     if problem.criterion.is_some() {
-                        self.comparing = true;
-                        self.evaluate_here(problem, angles);
+                        self.evaluate_here(problem, true, angles);
                     }
                     if self.here.h <= most {
                         let moves = angles.iter().zip(&self.phase_start).map(|(new, old)| (new - old).abs());
@@ -78,8 +71,7 @@ impl IkSolver {
                     break;
                 }
             }
-            self.comparing = problem.criterion.is_some();
-            self.evaluate_here(problem, angles);
+            self.evaluate_here(problem, true, angles);
             // If the images rejected even the smallest step, continues along the border of the region where they are satisfied.
             if self.objections.len() == refused * n {
                 return 0.0;
@@ -105,7 +97,7 @@ impl IkSolver {
         self.stages[count * n..].fill(0.0);
         for _ in 0..=n {
             self.linear.part.fill(0.0);
-            for rest in self.rest.iter().filter(|rest| rest.unknown < n) {
+            for rest in problem.rest.iter().filter(|rest| rest.unknown < n) {
                 let now = angles[rest.unknown] + self.stages[count * n + rest.unknown];
                 self.linear.part[rest.unknown] = rest.angle - now;
             }
@@ -115,10 +107,10 @@ impl IkSolver {
             }
         }
     }
+}
 
-    /// Sum of the squared differences between the angles and their rest values.
-    fn rest_error(&self, angles: &[f64]) -> f64 {
-        let drawn = self.rest.iter().filter_map(|rest| angles.get(rest.unknown).map(|angle| angle - rest.angle));
-        drawn.map(|off| off * off).sum()
-    }
+/// Sum of the squared differences between the angles and their rest values.
+fn rest_error(problem: &IkProblem, angles: &[f64]) -> f64 {
+    let drawn = problem.rest.iter().filter_map(|rest| angles.get(rest.unknown).map(|angle| angle - rest.angle));
+    drawn.map(|off| off * off).sum()
 }

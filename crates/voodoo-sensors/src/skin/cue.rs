@@ -124,14 +124,6 @@ pub struct FoundSite {
     pub depth: f64,
 }
 
-/// Where and when a site was last found.
-#[derive(Clone, Copy, Debug)]
-struct Trace {
-    place: Vec3,
-    velocity: Vec3,
-    stamp: f64,
-}
-
 /// Rows and columns of an image.
 type Window = [Range<usize>; 2];
 
@@ -150,7 +142,8 @@ pub struct SkinCue {
     pub candidates: Vec<SkinCandidate>,
     /// Pairs of site index and candidate index.
     pub assigned: Vec<(usize, usize)>,
-    traces: Vec<Option<Trace>>,
+    /// For each site where it was last found, and its velocity.
+    traces: Vec<Option<(Vec3, Vec3)>>,
     /// For each site the time of its last detection, or when it was first expected.
     missed: Vec<Option<f64>>,
 }
@@ -246,7 +239,7 @@ impl SkinCue {
                     .map(|index| ranges[*index])
                     .collect();
                 near.sort_unstable_by(f64::total_cmp);
-                let direction = input.eye.direction(input.eye.undistorted(pixel));
+                let direction = input.eye.direction(pixel);
                 let range = (near.len() >= 3).then(|| near[near.len() / 2] / direction.dot(input.eye.axis()));
                 let surface = range.map(|range| input.eye.origin() + range * direction);
                 if direction.is_finite() {
@@ -329,9 +322,10 @@ impl SkinCue {
             None => input.eye.distance_from_ray(target, candidate.direction),
         };
         let distance = from(site.place);
-        let kept = self.traces[site.site].filter(|_| input.depth.is_some()).and_then(|trace| {
-            let elapsed = input.stamp - trace.stamp;
-            let away = from(trace.place + elapsed * trace.velocity);
+        let trace = self.traces[site.site].zip(self.missed[site.site]).filter(|_| input.depth.is_some());
+        let kept = trace.and_then(|((place, velocity), since)| {
+            let elapsed = input.stamp - since;
+            let away = from(place + elapsed * velocity);
             (elapsed < KEPT.0 && away < SAME_REGION && distance < KEPT.1).then_some(away)
         });
         kept.map(|away| away.min(distance)).or((distance < gate).then_some(distance))
@@ -350,13 +344,13 @@ impl SkinCue {
     }
 
     fn remember(&mut self, site: usize, place: Vec3, stamp: f64) {
-        let moved = |trace: Trace| {
-            let elapsed = stamp - trace.stamp;
+        let moved = |((before, velocity), since): ((Vec3, Vec3), f64)| {
+            let elapsed = stamp - since;
             let fresh = 0.0 < elapsed && elapsed < KEPT.0;
-            if fresh { 0.5 * trace.velocity + 0.5 / elapsed * (place - trace.place) } else { Vec3::ZERO }
+            if fresh { 0.5 * velocity + 0.5 / elapsed * (place - before) } else { Vec3::ZERO }
         };
-        let velocity = self.traces[site].map_or(Vec3::ZERO, moved);
-        self.traces[site] = Some(Trace { place, velocity, stamp });
+        let velocity = self.traces[site].zip(self.missed[site]).map_or(Vec3::ZERO, moved);
+        self.traces[site] = Some((place, velocity));
         self.missed[site] = Some(stamp);
     }
 

@@ -14,11 +14,12 @@ import voodoo._core as _core
 from voodoo.errors import VoodooError
 from voodoo.export import ros2
 from voodoo.export.human_frames import placed_names
+from voodoo.export.layout import Layout
 from voodoo.export.template import STAMP_NS, template
 from voodoo.live.follow import Step
 from voodoo.live.ros2.dds import Node, Offer, Publication
 from voodoo.live.session import Output
-from voodoo.live.sinks.people import Layout, shown
+from voodoo.live.sinks.people import shown
 from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.model.body import Body
 from voodoo.pipeline.front_end import nobody

@@ -16,11 +16,12 @@ import numpy as np
 import voodoo._core as _core
 from voodoo.errors import VoodooError, installed, reading
 from voodoo.export.conventions import NAMES, names_of
+from voodoo.export.layout import Layout
 from voodoo.export.template import template
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
 from voodoo.live.sinks import parts_of
-from voodoo.live.sinks.people import Layout, shown
+from voodoo.live.sinks.people import shown
 from voodoo.measurements import FloatArray
 
 PORT = 39539

@@ -18,10 +18,11 @@ from urllib.parse import parse_qs
 
 import voodoo._core as _core
 from voodoo.errors import VoodooError, installed
+from voodoo.export.layout import Layout
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
 from voodoo.live.sinks import parts_of
-from voodoo.live.sinks.people import Layout, shown
+from voodoo.live.sinks.people import shown
 
 FORMAT, VERSION = "voodoo.people", 1
 """The version is increased if earlier readers would misread a message, not for additional keys."""

@@ -312,9 +312,10 @@ class KeypointSensor:
         shape = (self.camera.height, self.camera.width)
         if depth is not None and depth.shape != shape:
             raise MeasurementError(f"depth: expected the camera's shape {shape}, found {depth.shape}")
+        used = predicted if self.sites is None else {site: predicted[site] for site in self.sites if site in predicted}
         found, places, unseen, dropped = compiled(self.layout).observe(
             checked_rows(keypoints, self.layout),
-            predicted,
+            used,
             stamp=stamp,
             source=self.source,
             world_from_sensor=pose,
@@ -322,7 +323,6 @@ class KeypointSensor:
             noise=self.noise.pixels,
             place_sigma=POINT_SIGMA_M,
             least=self.min_confidence,
-            only=self.sites,
             gate=gate,
             surface=None
             if depth is None
