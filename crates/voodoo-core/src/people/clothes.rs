@@ -66,17 +66,19 @@ impl Clothes {
         }
     }
 
-    /// Returns the distance between two persons' clothes, from 0 to 1: the mean over the halves of the body that were observed of
-    /// both. `None` if there is none.
+    /// Returns the distance between two persons' clothes, from 0 to 1, by the colors of all halves of the body that were observed:
+    /// at a wrong pose, what is seen above the waist may be worn below it. `None` if one of them was not observed.
     pub(super) fn distance(&self, other: &Self) -> Option<f64> {
-        let pairs = self.worn.iter().zip(&other.worn).filter(|(a, b)| a.updates > 0.0 && b.updates > 0.0);
-        let (mut sum, mut count) = (0.0, 0.0);
-        for (a, b) in pairs {
-            let alike: f32 = a.frequencies.iter().zip(&b.frequencies).map(|(a, b)| (a * b).sqrt()).sum();
-            sum += 1.0 - f64::from(alike);
-            count += 1.0;
-        }
-        (count > 0.0).then(|| sum / count)
+        let alike: f32 = self.colors()?.iter().zip(other.colors()?).map(|(a, b)| (a * b).sqrt()).sum();
+        Some(1.0 - f64::from(alike))
+    }
+
+    /// The mean frequency of each color over the observed halves of the body; `None` if neither was observed.
+    fn colors(&self) -> Option<Vec<f32>> {
+        let seen: Vec<&Vec<f32>> =
+            self.worn.iter().filter(|half| half.updates > 0.0).map(|half| &half.frequencies).collect();
+        let mean = |bin| seen.iter().map(|half| half[bin]).sum::<f32>() / seen.len() as f32;
+        Some((0..seen.first()?.len()).map(mean).collect())
     }
 }
 
