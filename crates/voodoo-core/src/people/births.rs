@@ -192,10 +192,9 @@ impl People {
         }
         let cost = |(rank, track): (usize, &TentativeTrack)| {
             let clothes = self.clothes_of_track(frame, track);
-            let cost = |number: &usize| {
-                let person = &self.persons[*number];
-                person_cost(person, person.stature_deviation(self.detected(track)), track, &clothes, frame.stamp)
-            };
+            let size = |number: usize| self.persons[number].stature_cost(self.detected(track));
+            let cost =
+                |number: &usize| person_cost(&self.persons[*number], size(*number), track, &clothes, frame.stamp);
             absent.iter().map(|number| cost(number) + FIRST * rank as f64).collect()
         };
         let tracks: Vec<&TentativeTrack> = confirmed.iter().chain(self.tentative.updated_at(frame.stamp)).collect();
@@ -368,14 +367,13 @@ const CLOTHES: [f64; 2] = [0.10, 0.07];
 /// Evidence of equal clothes for the same person, nats.
 const LIKE_CLOTHES: f64 = 3.0;
 
-/// Returns the cost of assigning a tentative track to this person, nats. Stature and clothes of a person who is seen in part, or at
-/// a wrong pose, may be far off: their costs are linear beyond a standard deviation.
-fn person_cost(person: &Person, stature: f64, track: &TentativeTrack, clothes: &Clothes, stamp: f64) -> f64 {
-    let cost = |off: f64| off.min(1.0) * (off - 0.5 * off.min(1.0));
+/// Returns the cost of assigning a tentative track to this person, nats; `size` is the part from the person's stature.
+fn person_cost(person: &Person, size: f64, track: &TentativeTrack, clothes: &Clothes, stamp: f64) -> f64 {
     let far = person.distance_cost(track.place, stamp);
-    let color = person
-        .clothes
-        .distance(clothes)
-        .map_or(0.0, |distance| cost(((distance - CLOTHES[0]) / CLOTHES[1]).max(0.0)) - LIKE_CLOTHES);
-    far + cost(stature) + color
+    // Clothes of which a part is visible, or at a wrong pose, may be far off: linear beyond a standard deviation.
+    let color = person.clothes.distance(clothes).map_or(0.0, |distance| {
+        let off = ((distance - CLOTHES[0]) / CLOTHES[1]).max(0.0);
+        off.min(1.0) * (off - 0.5 * off.min(1.0)) - LIKE_CLOTHES
+    });
+    far + size + color
 }

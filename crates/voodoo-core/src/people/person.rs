@@ -103,10 +103,10 @@ impl Person {
         distance_cost(self.place.distance(place), stamp - self.last_tracked)
     }
 
-    /// Returns how far the detected stature is from this person's, standard deviations; 0 where one is unknown.
-    pub(super) fn stature_deviation(&self, detected: Detected) -> f64 {
+    /// Returns the cost of the detected stature for this person, nats.
+    pub(super) fn stature_cost(&self, detected: Detected) -> f64 {
         let both = self.stature.zip(stature(detected));
-        both.map_or(0.0, |([own, a], [other, b])| (other - own).abs() / (a + b).sqrt())
+        both.map_or(0.0, |([own, a], [other, b])| 0.5 * (other - own).powi(2) / (a + b))
     }
 
     /// Updates the person after the tracker's step. A person who has been lost for too long becomes absent.
