@@ -135,3 +135,32 @@ fn add(counts: &mut [f32], [first, green, last]: [u8; 3]) {
         counts[index] += weight;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Clothes of one color above the waist and one below it, as far as observed.
+    fn clothes(halves: [Option<usize>; 2]) -> Clothes {
+        let mut clothes = Clothes::default();
+        for (histogram, color) in clothes.worn.iter_mut().zip(halves) {
+            if let Some(color) = color {
+                let mut counts = vec![0.0; BINS.iter().product()];
+                counts[color] = 20.0;
+                histogram.update(&counts, 20.0);
+            }
+        }
+        clothes
+    }
+
+    #[test]
+    fn trousers_that_count_as_a_shirt_are_as_near_as_trousers_alone_and_other_clothes_are_far() {
+        let person = clothes([Some(1), Some(2)]);
+        let distance = |halves| person.distance(&clothes(halves));
+        assert!(distance([Some(1), Some(2)]).is_some_and(|same| same < 1e-6));
+        let part = distance([None, Some(2)]);
+        assert!(part.is_some_and(|part| part < 0.3) && part == distance([Some(2), None]));
+        assert_eq!(distance([Some(3), Some(4)]), Some(1.0));
+        assert_eq!(distance([None, None]), None);
+    }
+}
