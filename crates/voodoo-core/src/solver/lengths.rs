@@ -21,10 +21,11 @@ impl ChainSolver {
     ) -> bool {
         self.assemble(body, normal, poses, 0.0);
         self.couple(body, poses, pairs);
-        let count = pairs.len();
-        if !self.eliminate(count) {
+        if !factor(&mut self.h, self.chain.freedoms) {
             return false;
         }
+        let count = pairs.len();
+        self.eliminate(count);
         for row in 0..count {
             self.reduced[row * count + row] += LENGTH_INFORMATION[0] + pull[row];
             change[row] = pull[row] * change[row] - self.gradient[row];
@@ -32,25 +33,19 @@ impl ChainSolver {
         solve_in_place(&mut self.reduced, change, count)
     }
 
-    /// Writes the information of the relative length of each of `pairs` on its own to `information`, with the pose unknowns
-    /// eliminated. Uses the factorization of [`super::Spread::factor`].
+    /// Returns the information of the relative length of each of `pairs` on its own, with the pose unknowns eliminated. Uses the
+    /// factorization of [`super::Spread::factor`].
     pub(crate) fn length_information(
         &mut self,
         body: &Body,
         poses: &[Pose],
         pairs: &[Pair],
-        information: &mut Vec<f64>,
-    ) {
+    ) -> impl Iterator<Item = f64> {
+        let count = pairs.len();
         self.couple(body, poses, pairs);
-        let Self { chain, h, mixed, reduced, .. } = self;
-        let (n, count) = (chain.freedoms, pairs.len());
-        information.clear();
-        for row in 0..count {
-            let own = &mut mixed[row * n..(row + 1) * n];
-            half_substitute(h, own, n);
-            // A NaN leaves no information.
-            information.push((reduced[row * count + row] - dot(own, own)).max(0.0));
-        }
+        self.eliminate(count);
+        // A NaN leaves no information.
+        (0..count).map(move |row| self.reduced[row * count + row].max(0.0))
     }
 
     /// Computes second derivatives and gradient of the lengths, and the mixed derivatives with the pose unknowns.
@@ -90,14 +85,11 @@ impl ChainSolver {
         }
     }
 
-    /// Eliminates the pose unknowns; returns false when their matrix is not positive definite.
-    fn eliminate(&mut self, count: usize) -> bool {
+    /// Eliminates the pose unknowns, whose matrix was factored.
+    fn eliminate(&mut self, count: usize) {
         // `step` holds the negative gradient of the pose unknowns.
         let Self { chain, h, step, mixed, reduced, gradient, .. } = self;
         let n = chain.freedoms;
-        if !factor(h, n) {
-            return false;
-        }
         // With `H = L^T L`, `b^T H^-1 c` is the dot product of the two vectors after half of the substitution.
         half_substitute(h, step, n);
         for row in 0..count {
@@ -109,7 +101,6 @@ impl ChainSolver {
             }
             gradient[row] += dot(own, step);
         }
-        true
     }
 }
 

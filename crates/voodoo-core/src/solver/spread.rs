@@ -1,6 +1,6 @@
 //! Covariances of limbs and joints, from the inverse of the information of the chain's unknowns.
 
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, Vector6};
 
 use super::ChainSolver;
 use crate::body::Body;
@@ -32,74 +32,56 @@ impl Spread {
 
     /// Covariance of a limb's pose about the `origin` of its frame: rotation in world axes (radians), then translation (meters).
     pub(crate) fn of_limb(&mut self, limb: usize, origin: Vec3) -> Matrix6<f64> {
-        self.list(limb);
-        for unknown in &self.moving {
-            let screw = &self.system.screws[*unknown];
-            let row = &mut self.rows[*unknown];
-            for axis in 0..3 {
-                row[axis] = screw[axis];
-                row[3 + axis] = line(origin, Vec3::AXES[axis]).dot(screw);
-            }
-        }
-        self.solve_half();
-        self.gram()
+        self.covariance(limb, |_, screw| {
+            let moves = Vec3::AXES.map(|axis| line(origin, axis).dot(screw));
+            [screw[0], screw[1], screw[2], moves[0], moves[1], moves[2]]
+        })
     }
 
     /// Covariance of the unknowns of a limb's own joint, in their order; for the root: of its rotation, then of its translation.
     pub(crate) fn of_joint(&mut self, limb: usize) -> Matrix6<f64> {
-        self.list(limb);
-        for unknown in &self.moving {
-            self.rows[*unknown] = [0.0; 6];
-        }
-        for (own, unknown) in self.system.chain.unknowns(limb).enumerate() {
-            self.rows[unknown][own] = 1.0;
-        }
-        self.solve_half();
-        self.gram()
+        let own = self.system.chain.unknowns(limb);
+        self.covariance(limb, |unknown, _| {
+            let number = unknown.checked_sub(own.start);
+            std::array::from_fn(|index| if number == Some(index) { 1.0 } else { 0.0 })
+        })
     }
 
-    /// `Y^T Y` of the solved columns.
-    fn gram(&self) -> Matrix6<f64> {
-        let mut gram = Matrix6::zeros();
-        for unknown in &self.moving {
-            let row = &self.rows[*unknown];
-            for (j, right) in row.iter().enumerate() {
-                for (i, left) in row.iter().enumerate() {
-                    gram[(i, j)] += left * right;
-                }
-            }
+    /// Covariance of six sums of the unknowns that move a limb. `derivatives` returns those of all six with respect to an unknown,
+    /// of which the twist is given.
+    fn covariance(&mut self, limb: usize, derivatives: impl Fn(usize, &Vector6<f64>) -> [f64; 6]) -> Matrix6<f64> {
+        let Self { system: ChainSolver { chain, screws, h, .. }, rows, moving, .. } = self;
+        let n = chain.freedoms;
+        rows.resize(n, [0.0; 6]);
+        refill(moving, chain.up_from(limb).flat_map(|limb| chain.unknowns(limb).rev()));
+        for unknown in &*moving {
+            rows[*unknown] = derivatives(*unknown, &screws[*unknown]);
         }
-        gram
-    }
-
-    /// Lists the unknowns that move a limb.
-    fn list(&mut self, limb: usize) {
-        let chain = &self.system.chain;
-        self.rows.resize(chain.freedoms, [0.0; 6]);
-        refill(&mut self.moving, chain.up_from(limb).flat_map(|limb| chain.unknowns(limb).rev()));
-    }
-
-    /// Solves `L^T y = b` for six columns; with `H = L^T L`, `b^T H^-1 b = y^T y`. Only unknowns that move the limb take part.
-    fn solve_half(&mut self) {
-        let n = self.system.chain.freedoms;
-        for (place, unknown) in self.moving.iter().enumerate() {
-            let l = &self.system.h[unknown * n..unknown * n + unknown + 1];
-            let row = self.rows[*unknown].map(|value| value / l[*unknown]);
-            self.rows[*unknown] = row;
-            for other in &self.moving[place + 1..] {
+        // Solves `L^T y = b` for the six columns; with `H = L^T L`, `b^T H^-1 b = y^T y`.
+        let mut covariance = Matrix6::zeros();
+        for (place, unknown) in moving.iter().enumerate() {
+            let l = &h[unknown * n..unknown * n + unknown + 1];
+            let row = rows[*unknown].map(|value| value / l[*unknown]);
+            for other in &moving[place + 1..] {
                 let factor = l[*other];
-                for (value, known) in self.rows[*other].iter_mut().zip(&row) {
+                for (value, known) in rows[*other].iter_mut().zip(&row) {
                     *value -= factor * known;
                 }
             }
+            for (j, right) in row.iter().enumerate() {
+                for (i, left) in row.iter().enumerate() {
+                    covariance[(i, j)] += left * right;
+                }
+            }
         }
+        covariance
     }
 }
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
-    use nalgebra::{DMatrix, Vector6};
+    use nalgebra::DMatrix;
 
     use super::*;
     use crate::testing::{raised, standing};

@@ -41,9 +41,8 @@ pub(crate) struct Uncertainty {
     /// Variance of every unknown after the last frame.
     variance: Vec<f64>,
     information: Vec<f64>,
-    /// Information of the relative length of every pair of limbs: accumulated since the pose was set, and of this frame.
+    /// Information of the relative length of every pair of limbs, accumulated since the pose was set.
     known: Vec<f64>,
-    length_information: Vec<f64>,
 }
 
 /// A frame's pose and the measurements that support it.
@@ -81,7 +80,7 @@ impl Uncertainty {
     ) {
         self.expect(found);
         self.sum_terms(found, proven);
-        let Self { spread, variance, information, .. } = self;
+        let Self { spread, variance, information, known } = self;
         let body = &found.model.body;
         covariances.forget(body);
         let step = information.len() + 1;
@@ -104,21 +103,14 @@ impl Uncertainty {
         for (index, site) in body.sites().iter().enumerate() {
             covariances.set_site(index, site.limb, found.poses[site.limb].rotation * site.position);
         }
-        self.learn_lengths(found);
-        for (pair, known) in found.pairs.iter().zip(&self.known) {
+        known.resize(found.pairs.len(), LENGTH_INFORMATION[1]);
+        let lengths = spread.system.length_information(body, found.poses, found.pairs);
+        for ((pair, known), information) in found.pairs.iter().zip(known).zip(lengths) {
+            // Errors of successive frames are correlated.
+            *known += information / ALIKE;
             for limb in pair {
                 covariances.lengths[*limb] = body.limbs()[*limb].shape.length() / known.sqrt();
             }
-        }
-    }
-
-    /// Adds the frame's information on the limbs' lengths; errors of successive frames are correlated.
-    fn learn_lengths(&mut self, found: FittedPose) {
-        let Self { spread, known, length_information, .. } = self;
-        spread.system.length_information(&found.model.body, found.poses, found.pairs, length_information);
-        known.resize(found.pairs.len(), LENGTH_INFORMATION[1]);
-        for (known, length_information) in known.iter_mut().zip(length_information) {
-            *known += *length_information / ALIKE;
         }
     }
 
