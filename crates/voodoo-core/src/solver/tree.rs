@@ -8,14 +8,12 @@ use nalgebra::{Cholesky, Matrix6, Vector6};
 use super::{DAMPING, FLOOR, LARGEST_TURN};
 use crate::body::kinematics::exp;
 use crate::body::{Body, Joint, JointKind};
-use crate::math::{Pose, Vec3, refill, reset};
+use crate::math::{Pose, Vec3, reset};
 use crate::terms::normal_equations::{LimbBlock, NormalEquations, line};
 
 /// The system of one step, and its solution.
 #[derive(Debug, Default)]
 pub(crate) struct TreeSolver {
-    /// Parent of each limb, which always precedes it; the root is its own parent.
-    pub parent: Vec<usize>,
     /// A limb's own block of the matrix, and half the gradient of its twist.
     pub own: Vec<LimbBlock>,
     /// The block of the matrix between a limb (rows) and its parent (columns); unused for the root.
@@ -36,7 +34,7 @@ impl TreeSolver {
         poses: &mut [Pose],
     ) {
         self.assemble(body, normal, 1.0 / (band_sigma * band_sigma), poses);
-        if !self.solve() {
+        if !self.solve(body) {
             return;
         }
         let turn = |twist: &Vector6<f64>| twist.fixed_rows::<3>(0).amax();
@@ -49,7 +47,6 @@ impl TreeSolver {
     }
 
     fn assemble(&mut self, body: &Body, normal: &NormalEquations, strength: f64, poses: &[Pose]) {
-        refill(&mut self.parent, (0..poses.len()).map(|limb| body.parent(limb).unwrap_or(0)));
         self.own.clone_from(&normal.limbs);
         for block in &mut self.own {
             for i in 0..6 {
@@ -91,24 +88,21 @@ impl TreeSolver {
 
     /// Eliminates every limb into its parent, leaves first, then computes the twists from the root on. Returns false, with
     /// unusable twists, when the matrix is not positive definite. Overwrites `own` and `mixed`.
-    pub(crate) fn solve(&mut self) -> bool {
-        let Self { parent, own, mixed, twist } = self;
+    pub(crate) fn solve(&mut self, body: &Body) -> bool {
+        let Self { own, mixed, twist } = self;
         reset(twist, own.len(), Vector6::zeros());
         for limb in (0..own.len()).rev() {
             let Some(factor) = Cholesky::new(own[limb].h) else { return false };
             twist[limb] = -factor.solve(&own[limb].g);
-            if limb == 0 {
-                break;
-            }
+            let Some(parent) = body.parent(limb) else { break };
             // x = -H^-1 g - H^-1 M x_parent; the parent gets the Schur complement.
             let carried = factor.solve(&mixed[limb]);
-            let above = &mut own[parent[limb]];
-            above.h -= mixed[limb].tr_mul(&carried);
-            above.g += mixed[limb].tr_mul(&twist[limb]);
+            own[parent].h -= mixed[limb].tr_mul(&carried);
+            own[parent].g += mixed[limb].tr_mul(&twist[limb]);
             mixed[limb] = carried;
         }
-        for limb in 1..own.len() {
-            let follows = mixed[limb] * twist[parent[limb]];
+        for (limb, parent, _) in body.joints() {
+            let follows = mixed[limb] * twist[parent];
             twist[limb] -= follows;
         }
         twist.iter().all(|twist| twist.iter().all(|value| value.is_finite()))
