@@ -1,29 +1,11 @@
 //! Extrapolation of the body from the last two estimates to other times.
 
 use super::BodyTracker;
-use super::estimate::Estimate;
 use crate::error::TrackError;
 use crate::math::{Pose, Vec3};
 
 /// Largest plausible speed of a site, meters per second. A faster site has jumped and is expected to stay where it is.
 const FASTEST_SITE: f64 = 8.0;
-
-/// The parts of the estimate before the last one that extrapolation needs.
-#[derive(Debug, Default)]
-pub(super) struct Before {
-    stamp: f64,
-    world_from_limb: Vec<Pose>,
-    sites: Vec<Vec3>,
-}
-
-impl Before {
-    /// Stores an estimate before it is replaced.
-    pub(super) fn keep(&mut self, estimate: &Estimate) {
-        self.stamp = estimate.stamp;
-        self.world_from_limb.clone_from(&estimate.world_from_limb);
-        self.sites.clone_from(&estimate.sites);
-    }
-}
 
 /// Poses of all limbs in the last two estimates, world frame.
 ///
@@ -96,7 +78,7 @@ mod tests {
         let mut tracker = BodyTracker::new(body.clone(), Config { prediction: 0.5, ..Config::default() }).unwrap();
         assert!(matches!(tracker.expected_sites(0.0), Err(TrackError::NotInitialized)));
         tracker.reset_pose(&body.rest_pose(Pose::IDENTITY)).unwrap();
-        tracker.before.keep(&tracker.estimate);
+        tracker.before = tracker.estimate.clone();
         tracker.reset_pose(&body.rest_pose(Pose::from_translation(shift))).unwrap();
         (tracker.before.stamp, tracker.estimate.stamp) = (0.0, 0.1);
         tracker

@@ -23,7 +23,6 @@ use crate::sizes::{Sizes, Start};
 use crate::uncertainty::{FittedPose, Uncertainty};
 use assess::Assessor;
 use estimate::{Estimate, LimbStatus, Status};
-use expected::Before;
 
 /// After this time without a frame the body may be anywhere, in any pose, seconds.
 const INTERRUPTION: f64 = 0.5;
@@ -59,7 +58,8 @@ pub struct BodyTracker {
     assessor: Assessor,
     uncertainty: Uncertainty,
     estimate: Estimate,
-    before: Before,
+    /// The estimate before that one.
+    before: Estimate,
     /// Index of the image and pixels of the detection to which the body was moved in this frame.
     moved_to: Option<(usize, Vec<usize>)>,
 }
@@ -78,7 +78,7 @@ impl BodyTracker {
             assessor: Assessor::default(),
             uncertainty: Uncertainty::default(),
             estimate: Estimate::default(),
-            before: Before::default(),
+            before: Estimate::default(),
             moved_to: None,
             config,
         })
@@ -142,7 +142,7 @@ impl BodyTracker {
         self.relocalizer.detector.clear_error();
         self.moved_to = None;
         if self.is_started() {
-            self.before.keep(&self.estimate);
+            std::mem::swap(&mut self.before, &mut self.estimate);
             // Where the ground plane is not given, the one that the detector found under the body is used.
             let ground = frame.ground.or(self.relocalizer.floor);
             let colors = if self.config.regions { frame.colors } else { &[] };
@@ -194,7 +194,7 @@ impl BodyTracker {
         let set = known.then_some(&self.model.body);
         let Some(fitted) = self.relocalizer.fit_detected(&self.model, set) else { return false };
         self.restart_fitted(fitted, known, true);
-        self.before.keep(&self.estimate);
+        std::mem::swap(&mut self.before, &mut self.estimate);
         self.assessor.moved();
         self.track(frame, ownership);
         self.is_there()
