@@ -5,10 +5,10 @@ use super::estimate::Estimate;
 use crate::body::Body;
 use crate::config::Config;
 use crate::error::TrackError;
-use crate::math::{Points, Pose, Vec3, shifted};
+use crate::math::{Aabb, Points, Pose, Vec3, shifted};
 use crate::observation::frame::{Frame, PointSlice};
 use crate::regions::{ColorRegions, Posed, RegionLine};
-use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
+use crate::shape::SurfaceBatch;
 
 /// Length of the line of sight that is evaluated, meters: more than a trunk's width, and half a forearm's.
 const SEARCHED_DEPTH: f64 = 0.75;
@@ -16,15 +16,6 @@ const SEARCHED_DEPTH: f64 = 0.75;
 const PLACES: usize = 30;
 /// Bound on the error of distances in single precision: meters, and fraction of the distance.
 const ROUNDING: f64 = 1e-3;
-
-/// Whether the segment between two points in the limb frame is certainly outside of the limb, because the segment lies on one
-/// side of its bounding box.
-fn passes_by(shape: &TaperedEllipticCylinder, [from, to]: [Vec3; 2]) -> bool {
-    let (low, high) = (from.min(to), from.max(to));
-    // The factor covers rounding with a wide margin.
-    let [wide, deep] = [shape.a0().max(shape.a1()), shape.b0().max(shape.b1())].map(|most| 1.000_001 * most);
-    high.z <= 0.0 || low.z >= shape.length() || low.x >= wide || high.x <= -wide || low.y >= deep || high.y <= -deep
-}
 
 impl BodyTracker {
     /// Returns the lines along which the last step searched for color edges in a camera's picture.
@@ -153,7 +144,9 @@ impl BodyTracker {
             for (limb, limb_from_world) in limbs() {
                 let (start, along) = (limb_from_world.transform_point(*site), limb_from_world.rotation * direction);
                 // Most limbs do not meet the line of sight.
-                if passes_by(&limb.shape, [0, PLACES - 1].map(|step| start + far(step) * along)) {
+                let line = Aabb::from_points([0, PLACES - 1].map(|step| start + far(step) * along));
+                let bounds = limb.shape.local_aabb().enlarged(ROUNDING);
+                if (line.maxs.cmplt(bounds.mins) | line.mins.cmpgt(bounds.maxs)).any() {
                     continue;
                 }
                 for (step, inside) in inside.iter_mut().enumerate() {
@@ -171,13 +164,9 @@ impl BodyTracker {
         let mut queries = Points::default();
         for index in 0..points.len() {
             let point = points.get(index);
-            if !point.is_finite() {
-                return Err(TrackError::measurement(
-                    "points",
-                    "finite meters",
-                    format!("{:?} in row {index}", point.to_array()),
-                ));
-            }
+            let found = point.to_array();
+            let found = format_args!("{found:?} in row {index}");
+            TrackError::unless(point.is_finite(), "points", "finite meters", found)?;
             queries.push((point - self.motion.origin).to_array().map(|value| value as f32));
         }
         Ok(queries)
