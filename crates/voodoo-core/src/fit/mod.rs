@@ -2,7 +2,6 @@
 //! distance settles.
 
 mod context;
-mod edges;
 mod motion;
 
 pub(crate) use context::{Context, Matched, Setting};
@@ -158,7 +157,11 @@ impl Fit {
         self.contours.clear();
         self.match_assigned(context, poses, &gate, anew);
         self.find_regions(context, poses, context.config.max_steps);
-        self.measure_pixel_gains(context, poses);
+        if context.compares_colors() {
+            // What every limb of the arms and legs explains.
+            let supports = &mut self.correspondences.region_support;
+            self.regions.pixel_gains(context.posed(poses), &context.model.extremities, supports);
+        }
     }
 
     /// Matches only points, within `gate`, to the closest surface of any limb: for poses that the user set.
@@ -171,6 +174,11 @@ impl Fit {
     pub(crate) fn match_contour(&mut self, context: Context, poses: &[Pose]) {
         self.find_contour(context, poses);
         self.contours.pairs(poses, &mut self.correspondences.contour);
+    }
+
+    /// Searches for every color edge separately on both sides of a limb: the pairs determine its width.
+    pub(crate) fn match_single_edges(&mut self, context: Context, poses: &[Pose]) {
+        self.regions.find_single_edges(context.posed(poses), &mut self.correspondences.regions);
     }
 
     /// Computes the relative changes of length, one for each pair of limbs, that best fit the correspondences; see
@@ -230,6 +238,15 @@ impl Fit {
     fn find_contour(&mut self, context: Context, poses: &[Pose]) {
         if context.config.depth_contour {
             self.contours.find(&context.model.body, poses, context.observation.views.iter());
+        }
+    }
+
+    fn find_regions(&mut self, context: Context, poses: &[Pose], step: usize) {
+        let Self { regions, correspondences, .. } = self;
+        correspondences.regions.clear();
+        correspondences.region_support.clear();
+        if !context.observation.frame().colors.is_empty() {
+            regions.find(context.posed(poses), step, |limb| context.uses_edges(limb), correspondences);
         }
     }
 
