@@ -4,7 +4,7 @@ use crate::body::Body;
 use crate::fit::{Context, Matched};
 use crate::math::Pose;
 use crate::regions::ColorRegions;
-use crate::solver::{LIMIT_SIGMA, OVERLAP_SIGMA, SITE_SCALE};
+use crate::solver::{OVERLAP_SIGMA, SITE_SCALE};
 use crate::terms::{
     Colors, DetectedJoints, Floor, FreeSpace, Limits, PATCH, Penetration, Regions, Sites, Stance, Surface, Term,
 };
@@ -56,7 +56,7 @@ impl<'a> Objective<'a> {
             sites: Sites { correspondences, information, scale: SITE_SCALE, biased: true },
             detected: DetectedJoints { pairs: &correspondences.detected },
             regions: Regions { pairs: &correspondences.regions, colors },
-            limits: Limits { sigma: LIMIT_SIGMA },
+            limits: Limits,
             penetration: Penetration { sigma: OVERLAP_SIGMA, spheres: &[] },
             floor: observation.floor().map(|plane| {
                 (Floor { plane, sigma: OVERLAP_SIGMA }, Stance { extremities: &model.extremities, floor: plane })

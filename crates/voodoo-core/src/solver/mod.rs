@@ -27,8 +27,6 @@ use crate::observation::frame::Ground;
 
 /// Largest rotation of a joint or limb in one step, radians: the linearization is not valid beyond.
 const LARGEST_TURN: f64 = 0.5;
-/// Standard deviation of a violated joint limit, radians: 3 degrees.
-pub(crate) const LIMIT_SIGMA: f64 = 0.05;
 /// Relative damping of the normal matrix: unknowns with almost no measurements stay where they are.
 const DAMPING: f64 = 1e-3;
 /// Initial information of every unknown, so that nothing is singular.

@@ -8,7 +8,7 @@
 //! by the information of its points: an arm that can reach its hand position does not move the trunk, and a leg without
 //! measurements moves with its parent.
 
-use super::{ChainSolver, LIMIT_SIGMA, Problem};
+use super::{ChainSolver, Problem};
 use crate::association::correspondence::SitePair;
 use crate::body::Body;
 use crate::body::kinematics::{joint_turn, place};
@@ -113,7 +113,7 @@ impl WarmStart {
         let terms: [&dyn Term; 3] = [
             &Sites { correspondences, information, scale: SCALE, biased: true },
             &Prior { predicted: &self.start, root, joints: &self.joint_sigmas, holds: &[], rests: &[] },
-            &Limits { sigma: LIMIT_SIGMA },
+            &Limits,
         ];
         for term in terms {
             term.add(body, &self.closed, &mut self.normal);

@@ -1,7 +1,7 @@
 //! Solves for all limbs at once: sums the terms into one system, which the chain or the tree solves.
 
 use super::schedule::narrowed;
-use super::{ChainSolver, LIMIT_SIGMA, Problem, TreeSolver};
+use super::{ChainSolver, Problem, TreeSolver};
 use crate::body::{JointKind, Pair};
 use crate::config::SolverKind;
 use crate::math::{Pose, Quat, Vec3, refill, reset};
@@ -105,7 +105,7 @@ impl WholeBody {
         let free = Prior { predicted, root, joints: &self.joint_sigmas, holds: &[], rests: &self.rests };
         let holds = self.stillness.prior_gains(problem, &free, poses, gain);
         let prior = Prior { holds, ..free };
-        let limits = Limits { sigma: LIMIT_SIGMA };
+        let limits = Limits;
         refill(&mut self.spheres, body.limbs().iter().zip(poses).map(|(limb, pose)| limb.shape.sphere(pose)));
         let penetration = Penetration { sigma: OVERLAP_SIGMA, spheres: &self.spheres };
         let posture = Posture { fraction: config.motion_scale };

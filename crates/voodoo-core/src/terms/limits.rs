@@ -8,16 +8,16 @@ use crate::terms::normal_equations::NormalEquations;
 /// Greatest cost of a joint, nats: limits differ between persons.
 const LARGEST_LIMIT_COST: f64 = 3.0;
 
+/// Standard deviation of a violation, radians: 3 degrees.
+const LIMIT_SIGMA: f64 = 0.05;
+
 /// All joints that have limits.
 #[derive(Debug)]
-pub(crate) struct Limits {
-    /// Standard deviation of a violation, radians.
-    pub sigma: f64,
-}
+pub(crate) struct Limits;
 
 impl Term for Limits {
     fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations) {
-        let weight = 1.0 / (self.sigma * self.sigma);
+        let weight = 1.0 / (LIMIT_SIGMA * LIMIT_SIGMA);
         add_angles(body, poses, normal, |angle, [low, high]| {
             let excess = angle - angle.clamp(low, high);
             (excess.abs() > 0.0).then_some((weight, excess))
@@ -27,7 +27,7 @@ impl Term for Limits {
     fn cost(&self, body: &Body, poses: &[Pose], limb: usize) -> f64 {
         let Some((limits, _, v)) = limited_turn(body, poses, limb) else { return 0.0 };
         let excess = |(axis, [low, high]): (usize, &[f64; 2])| (low - v[axis]).max(v[axis] - high).max(0.0);
-        let squares: f64 = limits.iter().enumerate().map(|limit| (excess(limit) / self.sigma).powi(2)).sum();
+        let squares: f64 = limits.iter().enumerate().map(|limit| (excess(limit) / LIMIT_SIGMA).powi(2)).sum();
         (0.5 * squares).min(LARGEST_LIMIT_COST)
     }
 }
@@ -91,7 +91,7 @@ mod tests {
         let elbow = model.extremities[first_arm(&model)].lower;
         let (parent, joint) = model.body.limbs()[elbow].parent.as_ref().unwrap();
         let [[least, _], ..] = joint.limits.unwrap();
-        let term = Limits { sigma: 0.05 };
+        let term = Limits;
         assert!(term.cost(&model.body, &poses, elbow) < 1e-9);
         for (beyond, expected) in [(0.05, 0.5), (0.1, 2.0), (0.4, LARGEST_LIMIT_COST)] {
             let mut bent = poses.clone();

@@ -126,9 +126,9 @@ proptest! {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let poses = random_pose(&body, &angles);
         let beyond = |poses: &[Pose]| {
-            limited_angles(&body, poses).into_iter().map(|(angle, [low, high])| ((angle - angle.clamp(low, high)) / 0.1).powi(2)).sum()
+            limited_angles(&body, poses).into_iter().map(|(angle, [low, high])| ((angle - angle.clamp(low, high)) / 0.05).powi(2)).sum()
         };
-        check(&body, &poses, &|poses, normal| Limits { sigma: 0.1 }.add(&body, poses, normal), &beyond)?;
+        check(&body, &poses, &|poses, normal| Limits.add(&body, poses, normal), &beyond)?;
         let off_rest = |poses: &[Pose]| {
             let narrow = limited_angles(&body, poses).into_iter().filter(|(_, [low, high])| (1e-9..1.7).contains(&(high - low)));
             narrow.map(|(angle, [low, high])| ((angle - 0.0_f64.clamp(low, high)) / (0.125 * (high - low))).powi(2)).sum()
