@@ -193,22 +193,22 @@ impl Fit {
         change: &mut [f64],
     ) -> bool {
         let Self { whole_body, correspondences, .. } = self;
-        let problem = problem(context, correspondences, predicted, context.config.max_steps);
-        context.config.solver.is_whole_body() && whole_body.lengths(&problem, poses, pairs, pull, change)
+        let problem = Problem { context, correspondences, predicted, step: context.config.max_steps };
+        context.config.solver.is_whole_body() && whole_body.lengths(problem, poses, pairs, pull, change)
     }
 
     /// Warm start: follows the measured positions of named sites before the frame's steps.
     fn follow_sites(&mut self, context: Context, poses: &mut [Pose]) {
         let frame = context.observation.frame();
         let named = !frame.positions.is_empty() || !frame.rays.is_empty();
-        for round in 0.. {
+        for step in 0.. {
             if named && !context.config.solver.is_whole_body() {
                 self.match_all(context, poses, 0, true);
             } else {
                 self.match_sites(context, poses);
             }
-            let problem = problem(context, &self.correspondences, context.previous, round);
-            if !self.warm_start.prepare(&problem, poses) {
+            let Self { warm_start, correspondences, .. } = self;
+            if !warm_start.prepare(Problem { context, correspondences, predicted: context.previous, step }, poses) {
                 break;
             }
         }
@@ -275,25 +275,14 @@ impl Fit {
     pub(crate) fn solve(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose], step: usize) {
         let Self { whole_body, correspondences, band_weights, .. } = self;
         if context.config.solver.is_whole_body() {
-            whole_body.solve(&problem(context, correspondences, predicted, step), poses);
+            whole_body.solve(Problem { context, correspondences, predicted, step }, poses);
             return;
         }
         // 6 Elastic bands on both limbs.
         correspondences.add_bands(&context.model.body, poses, context.config.band_ratio, band_weights);
         // 7 Fit the model.
-        solve_limbwise(&problem(context, correspondences, predicted, step), poses);
+        solve_limbwise(correspondences, poses);
     }
-}
-
-fn problem<'a>(
-    context: Context<'a>,
-    correspondences: &'a Correspondences,
-    predicted: &'a [Pose],
-    step: usize,
-) -> Problem<'a> {
-    let Context { config, model, observation, time_scale, .. } = context;
-    let (body, extremities, floor) = (&model.body, model.extremities.as_slice(), observation.floor());
-    Problem { body, extremities, correspondences, predicted, floor, step, time_scale, config }
 }
 
 #[cfg(test)]

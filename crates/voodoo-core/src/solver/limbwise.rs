@@ -1,15 +1,13 @@
 //! The published solver: weighted absolute orientation of each limb separately (K06 IV-B.7, K07 3.2).
 
-use super::Problem;
-use crate::association::correspondence::LimbMatches;
+use crate::association::correspondence::{Correspondences, LimbMatches};
 use crate::math::{Moments, Pose, Vec3};
 
 /// Lever of the damping against rotation where the pairs do not determine it, meters: the girth of a limb.
 const STAY: f64 = 0.05;
 
 /// Moves each limb to the optimum of its own pairs; information crosses one joint per step through the bands.
-pub(crate) fn solve_limbwise(problem: &Problem, poses: &mut [Pose]) {
-    let correspondences = problem.correspondences;
+pub(crate) fn solve_limbwise(correspondences: &Correspondences, poses: &mut [Pose]) {
     for (limb, pose) in poses.iter_mut().enumerate() {
         // Moments about the limb's own position keep the sums well conditioned.
         let center = pose.translation;

@@ -19,11 +19,8 @@ pub(crate) use warm_start::WarmStart;
 pub(crate) use whole_body::{LENGTH_INFORMATION, OVERLAP_SIGMA, SITE_SCALE, WholeBody};
 
 use crate::association::correspondence::Correspondences;
-use crate::body::Body;
-use crate::body::two_bone::TwoBone;
-use crate::config::Config;
+use crate::fit::Context;
 use crate::math::Pose;
-use crate::observation::frame::Ground;
 
 /// Largest rotation of a joint or limb in one step, radians: the linearization is not valid beyond.
 const LARGEST_TURN: f64 = 0.5;
@@ -33,22 +30,14 @@ const DAMPING: f64 = 1e-3;
 const FLOOR: f64 = 1e-6;
 
 /// Input of a solver: one ICP step of one frame.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Problem<'a> {
-    /// The body.
-    pub body: &'a Body,
-    /// Its arms and legs.
-    pub extremities: &'a [TwoBone],
+    /// The frame and the body.
+    pub context: Context<'a>,
     /// Correspondences at the current poses.
     pub correspondences: &'a Correspondences,
     /// The predicted poses, from before this frame's measurements.
     pub predicted: &'a [Pose],
-    /// The ground plane in the working frame, if it is known.
-    pub floor: Option<Ground>,
     /// Index of the step in its frame.
     pub step: usize,
-    /// Time since the last frame, in units of 1/30 s; the standard deviations of motion grow with it.
-    pub time_scale: f64,
-    /// Parameters.
-    pub config: &'a Config,
 }

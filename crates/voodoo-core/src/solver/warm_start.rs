@@ -10,9 +10,10 @@
 
 use super::{ChainSolver, Problem};
 use crate::association::correspondence::SitePair;
-use crate::body::Body;
 use crate::body::kinematics::{joint_turn, place};
+use crate::body::{Body, Model};
 use crate::config::SolverKind;
+use crate::fit::Context;
 use crate::math::{Pose, refill, reset};
 use crate::terms::normal_equations::{LimbBlock, NormalEquations};
 use crate::terms::{Limits, Prior, Sites, Surface, Term};
@@ -36,10 +37,9 @@ pub(crate) struct WarmStart {
     normal: NormalEquations,
     chain: ChainSolver,
     joint_sigmas: Vec<f64>,
-    /// The poses with closed joints: before the frame, now, and before the last step.
+    /// The poses with closed joints: before the frame, now, and after a step of all limbs.
     start: Vec<Pose>,
     closed: Vec<Pose>,
-    before: Vec<Pose>,
     moved: Vec<Pose>,
     /// The limbs that the sites move.
     driven: Vec<bool>,
@@ -51,8 +51,8 @@ pub(crate) struct WarmStart {
 impl WarmStart {
     /// Follows the named sites before the first step of a frame. Returns true to request another round. `problem.predicted` are the
     /// poses before the frame.
-    pub(crate) fn prepare(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {
-        let (drives, rounds) = match problem.config.solver {
+    pub(crate) fn prepare(&mut self, problem: Problem, poses: &mut [Pose]) -> bool {
+        let (drives, rounds) = match problem.context.config.solver {
             SolverKind::Limbwise => (self.drives_all(problem), LIMBWISE_ROUNDS),
             SolverKind::Chain => (self.drives_far(problem), WARM_START_ROUNDS),
             SolverKind::Tree => return false,
@@ -64,39 +64,42 @@ impl WarmStart {
     }
 
     /// Lets all limbs move, with points matched; returns false without sites.
-    fn drives_all(&mut self, problem: &Problem) -> bool {
-        let count = problem.body.limbs().len();
+    fn drives_all(&mut self, problem: Problem) -> bool {
+        let body = &problem.context.model.body;
+        let count = body.limbs().len();
         reset(&mut self.driven, count, true);
         reset(&mut self.following, count, false);
         for pair in problem.correspondences.sites.iter().filter(|pair| pair.base_weight > 0.0) {
             self.following[pair.limb] = true;
-            drive_from(problem.body, pair.limb, &mut self.following);
+            drive_from(body, pair.limb, &mut self.following);
         }
         self.following.contains(&true)
     }
 
     /// Whether sites far from their measured positions move their limbs in this frame, without points.
-    fn drives_far(&mut self, problem: &Problem) -> bool {
+    fn drives_far(&mut self, problem: Problem) -> bool {
         if problem.step == 0 {
             let far = |pair: &&SitePair| pair.weight > 0.0 && (pair.across * (pair.x - pair.p)).length() > DRIVEN_FROM;
             self.following.clear();
-            reset(&mut self.driven, problem.body.limbs().len(), false);
+            let body = &problem.context.model.body;
+            reset(&mut self.driven, body.limbs().len(), false);
             for pair in problem.correspondences.sites.iter().filter(far) {
-                drive_from(problem.body, pair.limb, &mut self.driven);
+                drive_from(body, pair.limb, &mut self.driven);
             }
         }
         self.driven.contains(&true)
     }
 
     /// One step: each limb moves as it would with closed joints; gaps that the bands left are kept.
-    fn step(&mut self, problem: &Problem, poses: &mut [Pose]) {
-        let Problem { body, correspondences, config, .. } = problem;
+    fn step(&mut self, problem: Problem, poses: &mut [Pose]) {
+        let Problem { context, correspondences, .. } = problem;
+        let Context { model: Model { body, .. }, config, .. } = context;
         if problem.step == 0 {
             poses.clone_into(&mut self.start);
             close(body, &mut self.start);
             self.closed.clone_from(&self.start);
         }
-        let time_scale = problem.time_scale * config.motion_scale;
+        let time_scale = context.time_scale * config.motion_scale;
         let motions = body.limbs().iter().map(|part| part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion));
         refill(&mut self.joint_sigmas, motions.map(|motion| motion * time_scale));
         let root = [config.root_turn_sigma, config.root_shift_sigma].map(|sigma| sigma * time_scale);
@@ -112,31 +115,32 @@ impl WarmStart {
         }
         let terms: [&dyn Term; 3] = [
             &Sites { correspondences, information, scale: SCALE, biased: true },
-            &Prior { predicted: &self.start, root, joints: &self.joint_sigmas, holds: &[], rests: &[] },
+            &Prior { predicted: &self.start, root, joints: &self.joint_sigmas, gain: 0.0, stillness: &[], rests: &[] },
             &Limits,
         ];
         for term in terms {
             term.add(body, &self.closed, &mut self.normal);
         }
-        self.before.clone_from(&self.closed);
         self.moved.clone_from(&self.closed);
         self.chain.step(body, &self.normal, 1.0, &mut self.moved);
-        // Limbs that are not driven keep their poses.
-        for (limb, part) in body.limbs().iter().enumerate().filter(|(limb, _)| self.driven[*limb]) {
-            self.closed[limb] = part.parent.as_ref().map_or(self.moved[limb], |(parent, joint)| {
-                let turn = joint_turn(joint, &self.moved[*parent], &self.moved[limb]);
-                place(joint, &self.closed[*parent], turn)
-            });
-        }
-        for ((pose, before), after) in poses.iter_mut().zip(&self.before).zip(&self.closed) {
-            *pose = *after * before.inverse() * *pose;
+        for (limb, pose) in poses.iter_mut().enumerate() {
+            let before = self.closed[limb];
+            // Limbs that are not driven keep their poses.
+            if self.driven[limb] {
+                self.closed[limb] = body.limbs()[limb].parent.as_ref().map_or(self.moved[limb], |(parent, joint)| {
+                    let turn = joint_turn(joint, &self.moved[*parent], &self.moved[limb]);
+                    place(joint, &self.closed[*parent], turn)
+                });
+            }
+            *pose = self.closed[limb] * before.inverse() * *pose;
             pose.rotation = pose.rotation.normalize();
         }
     }
 
     /// Points of the following limbs pull them; points of the other limbs hold those in place.
-    fn add_points(&mut self, problem: &Problem, information: f64) {
-        let Problem { body, correspondences, config, .. } = problem;
+    fn add_points(&mut self, problem: Problem, information: f64) {
+        let Problem { context: Context { model, config, .. }, correspondences, .. } = problem;
+        let body = &model.body;
         let surface =
             |slide| Surface { correspondences, information, tangential_weight: slide, scale: config.kernel_start };
         // Following limbs may slide along their own axis.

@@ -2,8 +2,9 @@
 
 use super::schedule::narrowed;
 use super::{ChainSolver, Problem, TreeSolver};
-use crate::body::{JointKind, Pair};
+use crate::body::{JointKind, Model, Pair};
 use crate::config::SolverKind;
+use crate::fit::Context;
 use crate::math::{Pose, Quat, Vec3, refill, reset};
 use crate::terms::normal_equations::NormalEquations;
 use crate::terms::{DetectedJoints, Floor, Limits, Measurements, Penetration, Posture, Prior, Rest, Term};
@@ -52,26 +53,21 @@ pub(crate) struct WholeBody {
     points: f64,
     /// Bounding sphere of each limb.
     spheres: Vec<(Vec3, f64)>,
-    stillness: Stillness,
-}
-
-/// Stillness of the root and the joints, computed in the step in which the still prior begins; and the last step.
-#[derive(Debug, Default)]
-struct Stillness {
-    joints: Vec<f64>,
-    step: usize,
-    holds: Vec<f64>,
+    /// Stillness of the root and the joints, computed in the step in which the still prior begins; and the last step.
+    stillness: Vec<f64>,
+    last_step: usize,
 }
 
 impl WholeBody {
     /// One update of all poses (working frame).
-    pub(crate) fn solve(&mut self, problem: &Problem, poses: &mut [Pose]) {
+    pub(crate) fn solve(&mut self, problem: Problem, poses: &mut [Pose]) {
         self.sum_terms(problem, poses, true);
-        let follows = problem.step + 1 < problem.config.max_steps;
+        let Context { model: Model { body, .. }, config, .. } = problem.context;
+        let follows = problem.step + 1 < config.max_steps;
         let stride = if follows { 1.0 + self.points * OVER_RELAXATION } else { 1.0 };
-        match problem.config.solver {
-            SolverKind::Tree => self.tree.step(problem.body, &self.normal, stride, problem.config.band_sigma, poses),
-            _ => self.chain.step(problem.body, &self.normal, stride, poses),
+        match config.solver {
+            SolverKind::Tree => self.tree.step(body, &self.normal, stride, config.band_sigma, poses),
+            _ => self.chain.step(body, &self.normal, stride, poses),
         }
     }
 
@@ -80,43 +76,48 @@ impl WholeBody {
     /// the lengths are not determined.
     pub(crate) fn lengths(
         &mut self,
-        problem: &Problem,
+        problem: Problem,
         poses: &[Pose],
         pairs: &[Pair],
         pull: &[f64],
         change: &mut [f64],
     ) -> bool {
         self.sum_terms(problem, poses, false);
-        self.chain.lengths(problem.body, &self.normal, poses, pairs, pull, change)
+        self.chain.lengths(&problem.context.model.body, &self.normal, poses, pairs, pull, change)
     }
 
     /// Sums the normal equations at `poses`, with or without the sites that have a bias.
-    fn sum_terms(&mut self, problem: &Problem, poses: &[Pose], biased: bool) {
+    fn sum_terms(&mut self, problem: Problem, poses: &[Pose], biased: bool) {
         self.weigh_sites(problem, poses.len(), biased);
         self.expect_motion(problem);
-        let Problem { body, correspondences, predicted, config, .. } = problem;
+        let Problem { context, correspondences, predicted, step } = problem;
+        let Context { model: Model { body, .. }, config, .. } = context;
         let information = 1.0 / (config.point_sigma * config.point_sigma);
-        let scale = narrowed(config.kernel_start, config.kernel_end, problem.step);
+        let scale = narrowed(config.kernel_start, config.kernel_end, step);
         let root = [config.root_turn_sigma, config.root_shift_sigma]
-            .map(|sigma| sigma * problem.time_scale * config.motion_scale);
+            .map(|sigma| sigma * context.time_scale * config.motion_scale);
         let scales = [scale, (3.0 * scale).max(SITE_SCALE)];
         let measurements = Measurements { correspondences, config, scales, biased };
         let gain = still_prior_gain(problem, information);
-        let free = Prior { predicted, root, joints: &self.joint_sigmas, holds: &[], rests: &self.rests };
-        let holds = self.stillness.prior_gains(problem, &free, poses, gain);
-        let prior = Prior { holds, ..free };
-        let limits = Limits;
+        let (joints, rests) = (&self.joint_sigmas, &self.rests);
+        let free = Prior { predicted, root, joints, rests, gain, stillness: &[] };
+        // Each frame, and each hypothesis in it, starts at a step that is not after the last one of its predecessor.
+        if step <= self.last_step || step == STILL_FROM {
+            free.find_stillness(body, poses, &mut self.stillness);
+        }
+        self.last_step = step;
+        let prior = Prior { stillness: &self.stillness, ..free };
         refill(&mut self.spheres, body.limbs().iter().zip(poses).map(|(limb, pose)| limb.shape.sphere(pose)));
         let penetration = Penetration { sigma: OVERLAP_SIGMA, spheres: &self.spheres };
         let posture = Posture { fraction: config.motion_scale };
-        let floor = problem.floor.map(|plane| Floor { plane, sigma: OVERLAP_SIGMA });
+        let floor = context.observation.floor().map(|plane| Floor { plane, sigma: OVERLAP_SIGMA });
         // The cost function: a new term is a new file and a line here.
         let detected = DetectedJoints { pairs: &correspondences.detected };
         let terms: [Option<&dyn Term>; 7] = [
             Some(&measurements),
             biased.then_some(&detected),
             Some(&prior),
-            config.limits.then_some(&limits),
+            config.limits.then_some(&Limits),
             Some(&posture),
             config.penetration.then_some(&penetration),
             floor.as_ref().filter(|_| config.penetration).map(|floor| floor as &dyn Term),
@@ -128,29 +129,31 @@ impl WholeBody {
     }
 
     /// A site gives information on every joint between it and the root: the position of a hand constrains the arm.
-    fn weigh_sites(&mut self, problem: &Problem, limbs: usize, biased: bool) {
+    fn weigh_sites(&mut self, problem: Problem, limbs: usize, biased: bool) {
         reset(&mut self.sites, limbs, 0.0);
         for pair in problem.correspondences.sites.iter().filter(|pair| biased || pair.bias <= 0.0) {
             self.sites[pair.limb] += pair.weight;
         }
-        for (limb, parent, _) in problem.body.joints().rev() {
+        for (limb, parent, _) in problem.context.model.body.joints().rev() {
             self.sites[parent] += self.sites[limb];
         }
     }
 
     /// Computes the standard deviation of every joint's motion.
-    fn expect_motion(&mut self, problem: &Problem) {
-        let information = 1.0 / (problem.config.point_sigma * problem.config.point_sigma);
-        reset(&mut self.edges, problem.body.limbs().len(), 0.0);
-        for pair in &problem.correspondences.regions {
+    fn expect_motion(&mut self, problem: Problem) {
+        let Problem { context, correspondences, .. } = problem;
+        let Context { model: Model { body, .. }, config, time_scale, .. } = context;
+        let information = 1.0 / (config.point_sigma * config.point_sigma);
+        reset(&mut self.edges, body.limbs().len(), 0.0);
+        for pair in &correspondences.regions {
             self.edges[pair.limb] += pair.information / information;
         }
         self.joint_sigmas.clear();
         self.rests.clear();
         let mut all_points = 0.0;
-        for (limb, part) in problem.body.limbs().iter().enumerate() {
+        for (limb, part) in body.limbs().iter().enumerate() {
             let motion = part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion);
-            let points = problem.correspondences.limbs[limb].total_weight();
+            let points = correspondences.limbs[limb].total_weight();
             all_points += points;
             // A limb that is hardly visible stays near its prediction: a few stray points must not move it.
             let measured = points + self.sites[limb] + self.edges[limb];
@@ -159,10 +162,10 @@ impl WholeBody {
             let rests = part.match_caps[1] && joint.is_some_and(|joint| joint.kind() == JointKind::Elliptic);
             self.rests.push(Rest {
                 rotation: joint.map_or(Quat::IDENTITY, |joint| joint.parent_from_limb_at_rest().rotation),
-                fraction: if rests { to_rest(problem, TO_REST, measured_fraction) } else { 0.0 },
+                fraction: if rests { to_rest(context, TO_REST, measured_fraction) } else { 0.0 },
             });
             let measured_fraction = measured_fraction.max(HIDDEN_MOTION);
-            self.joint_sigmas.push(motion * measured_fraction * problem.time_scale * problem.config.motion_scale);
+            self.joint_sigmas.push(motion * measured_fraction * time_scale * config.motion_scale);
         }
         let edges: f64 = self.edges.iter().sum();
         self.points = if edges > 0.0 { all_points / (all_points + edges) } else { 1.0 };
@@ -170,9 +173,10 @@ impl WholeBody {
     }
 
     /// Lets legs that nothing shows stand or sit on the floor.
-    fn rest_legs(&mut self, problem: &Problem) {
-        let Problem { body, extremities, correspondences, predicted, .. } = problem;
-        let Some(floor) = problem.floor.filter(|_| problem.config.penetration) else { return };
+    fn rest_legs(&mut self, problem: Problem) {
+        let Problem { context, correspondences, predicted, .. } = problem;
+        let Context { model: Model { body, extremities, .. }, observation, config, .. } = context;
+        let Some(floor) = observation.floor().filter(|_| config.penetration) else { return };
         for leg in extremities.iter().filter(|chain| chain.leg) {
             let trunk = body.parent(leg.upper).map_or(Quat::IDENTITY, |trunk| predicted[trunk].rotation);
             let rotations = leg.turned(body, trunk, leg.standing(body, predicted, floor));
@@ -180,7 +184,7 @@ impl WholeBody {
             let mut measured = leg.ends.iter().map(shown).sum::<f64>();
             for (limb, rotation) in [leg.lower, leg.upper].into_iter().zip(rotations.into_iter().rev()) {
                 measured += shown(&limb);
-                let fraction = to_rest(problem, LEG_TO_REST, ((measured + self.sites[limb]) / FREE_WEIGHT).min(1.0));
+                let fraction = to_rest(context, LEG_TO_REST, ((measured + self.sites[limb]) / FREE_WEIGHT).min(1.0));
                 self.rests[limb] = Rest { rotation, fraction };
             }
         }
@@ -188,30 +192,15 @@ impl WholeBody {
 }
 
 /// Fraction of the way to its rest that a limb moves in a frame of which this fraction is measured, at `rate` where nothing is.
-fn to_rest(problem: &Problem, rate: f64, measured: f64) -> f64 {
-    ((1.0 - measured) * rate * problem.time_scale).min(1.0)
-}
-
-impl Stillness {
-    /// Additional information of the root and of each joint in this step, at most `gain`.
-    fn prior_gains(&mut self, problem: &Problem, prior: &Prior, poses: &[Pose], gain: f64) -> &[f64] {
-        let Self { joints, step, holds } = self;
-        // Each frame, and each hypothesis in it, starts at a step that is not after the last one of its predecessor.
-        let anew = problem.step <= *step || joints.len() != poses.len();
-        *step = problem.step;
-        if anew || problem.step == STILL_FROM {
-            prior.stillness(problem.body, poses, joints);
-        }
-        refill(holds, joints.iter().map(|stillness| gain * stillness));
-        holds
-    }
+fn to_rest(context: Context, rate: f64, measured: f64) -> f64 {
+    ((1.0 - measured) * rate * context.time_scale).min(1.0)
 }
 
 /// Gain of the prior for small deviations from the prediction, in this step.
-fn still_prior_gain(problem: &Problem, information: f64) -> f64 {
-    let Problem { correspondences, config, step, .. } = problem;
+fn still_prior_gain(problem: Problem, information: f64) -> f64 {
+    let Problem { context: Context { config, .. }, correspondences, step, .. } = problem;
     // After the last step only lengths are estimated: with a tight prior of the pose, they would absorb every deviation.
-    let holds = (STILL_FROM..config.max_steps).contains(step);
+    let holds = (STILL_FROM..config.max_steps).contains(&step);
     // When points lie closer to the body than `point_sigma` suggests, a small deviation is motion and not noise.
     let scatter = if holds { correspondences.scatter(config.kernel_end).unwrap_or(0.0) } else { 0.0 };
     config.still_prior_gain * (scatter * information / (ROUGH * ROUGH)).min(1.0)

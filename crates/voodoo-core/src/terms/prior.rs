@@ -2,7 +2,7 @@
 //! predicted ones.
 //!
 //! R07's penalty is quadratic: if it is strong enough for a body at rest, it makes a fast body lag. Here the information of a
-//! joint grows the less the measurements move it from the prediction ([`Prior::stillness`]), because a small deviation is
+//! joint grows the less the measurements move it from the prediction ([`Prior::find_stillness`]), because a small deviation is
 //! probably noise. The stillness is computed once per frame, from the deviation that the measurements alone cause. Computed
 //! again in every step, it would feed back: a tighter prior makes the deviation smaller, which tightens the prior further, until
 //! the joint sticks at its previous position.
@@ -27,8 +27,10 @@ pub(crate) struct Prior<'a> {
     pub root: [f64; 2],
     /// Standard deviation of each joint's rotation, radians.
     pub joints: &'a [f64],
-    /// Additional information of the root (first) and of each joint, as multiples of their information; empty for none.
-    pub holds: &'a [f64],
+    /// Additional information of a root or joint that is still, as a multiple of its information.
+    pub gain: f64,
+    /// Stillness of the root (first) and of each joint, see [`Self::find_stillness`]; empty where none is still.
+    pub stillness: &'a [f64],
     /// Where each joint rests when nothing shows it; empty for none.
     pub rests: &'a [Rest],
 }
@@ -43,7 +45,7 @@ pub(crate) struct Rest {
 
 impl Prior<'_> {
     /// Writes the stillness of the root (first) and of each joint: 1 where they are as predicted, towards 0 where they move.
-    pub(crate) fn stillness(&self, body: &Body, poses: &[Pose], stillness: &mut Vec<f64>) {
+    pub(crate) fn find_stillness(&self, body: &Body, poses: &[Pose], stillness: &mut Vec<f64>) {
         let fraction = |deviation: f64| geman_mcclure(deviation, WELL);
         stillness.clear();
         stillness.extend(body.limbs().iter().enumerate().map(|(index, limb)| match &limb.parent {
@@ -76,7 +78,7 @@ impl Term for Prior<'_> {
     fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations) {
         let information = |sigma: f64, hold: f64| (1.0 + hold) / (sigma * sigma);
         let (r, d) = self.root_deviation(poses);
-        let hold = |index: usize| self.holds.get(index).copied().unwrap_or(0.0);
+        let hold = |index: usize| self.stillness.get(index).map_or(0.0, |stillness| self.gain * stillness);
         let (turn, shift) =
             (information(self.root[0], ROOT_FRACTION * hold(0)), information(self.root[1], ROOT_FRACTION * hold(0)));
         let block = &mut normal.limbs[0];

@@ -95,7 +95,7 @@ proptest! {
     fn prior(angles in angles(), other in angles(), hold in prop::sample::select(vec![0.0, 30.0])) {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let predicted = random_pose(&body, &other);
-        let [sigmas, holds] = [0.02, hold].map(|value| vec![value; predicted.len()]);
+        let [sigmas, still] = [0.02, 1.0].map(|value| vec![value; predicted.len()]);
         let rests: Vec<Rest> = body.limbs().iter().map(|limb| {
             let joint = limb.parent.as_ref().map(|(_, joint)| joint.parent_from_limb_at_rest());
             Rest { rotation: joint.map_or(Quat::IDENTITY, |joint| joint.rotation), fraction: 0.01 }
@@ -116,7 +116,7 @@ proptest! {
             (1.0 + 0.2 * hold) * (turn.length_squared() + shift.length_squared()) + (1.0 + hold) * joints
         };
         let prior = |poses: &[Pose], normal: &mut NormalEquations| {
-            Prior { predicted: &predicted, root: [0.02, 0.04], joints: &sigmas, holds: &holds, rests: &rests }.add(&body, poses, normal);
+            Prior { predicted: &predicted, root: [0.02, 0.04], joints: &sigmas, gain: hold, stillness: &still, rests: &rests }.add(&body, poses, normal);
         };
         check(&body, &near, &prior, &cost)?;
     }
