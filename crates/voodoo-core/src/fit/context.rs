@@ -1,6 +1,5 @@
 //! Read-only inputs of everything that estimates a pose in a frame.
 
-use crate::association::correspondence::Correspondences;
 use crate::body::Model;
 use crate::body::two_bone::TwoBone;
 use crate::config::Config;
@@ -70,15 +69,6 @@ impl<'a> Setting<'a> {
         let Self { config, observation, previous, time_scale } = self;
         Context { config, model, observation, previous, time_scale }
     }
-}
-
-/// Correspondences and the poses at which they were found.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Matched<'a> {
-    /// The correspondences.
-    pub correspondences: &'a Correspondences,
-    /// The poses, working frame.
-    pub poses: &'a [Pose],
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 mod context;
 mod motion;
 
-pub(crate) use context::{Context, Matched, Setting};
+pub(crate) use context::{Context, Setting};
 pub(crate) use motion::{Motion, UNKNOWN_MOTION};
 
 use crate::association::assignment::{Assignment, match_limb};
@@ -84,11 +84,6 @@ impl Fit {
     pub(crate) fn forget_detected(&mut self) {
         self.detected.clear();
         self.detected_limbs.clear();
-    }
-
-    /// Returns the last correspondences together with `poses`, at which they were found.
-    pub(crate) fn matched<'a>(&'a self, poses: &'a [Pose]) -> Matched<'a> {
-        Matched { correspondences: &self.correspondences, poses }
     }
 
     /// Exchanges the last correspondences, so that another pose can be tried in between.

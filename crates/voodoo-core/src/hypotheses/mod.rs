@@ -6,13 +6,12 @@ mod objective;
 mod proposals;
 mod refined;
 mod rough;
-mod rough_points;
 mod unexplained;
 
 pub(crate) use objective::{MARGIN, Objective};
 pub(crate) use proposals::SWIVELS;
 pub(crate) use refined::REFINE;
-pub(crate) use rough_points::{ROUGH_SAMPLE, explain};
+pub(crate) use rough::{ROUGH_SAMPLE, explain};
 
 use crate::association::correspondence::RegionSupport;
 use crate::body::Model;
@@ -22,7 +21,7 @@ use crate::math::{Pose, make_room};
 use crate::terms::PATCH;
 use crate::visibility::LITTLE;
 use branch::Branch;
-use proposals::{ColorDirections, DetectedEnd, Pool, Propose, UnexplainedCluster};
+use proposals::{Pool, propose_clusters, propose_color_directions, propose_detected_end};
 use refined::{Refined, is_elsewhere};
 use rough::{Extremity, RoughSearch};
 use unexplained::Unexplained;
@@ -35,8 +34,6 @@ const UNLIKE_FRAME: f64 = 0.85;
 pub(crate) struct Hypotheses {
     unexplained: Unexplained,
     rough: RoughSearch,
-    clusters: UnexplainedCluster,
-    color_directions: ColorDirections,
     pool: Pool,
     refined: Refined,
     /// The second branch of the body, fitted to the same color images.
@@ -75,7 +72,7 @@ impl Hypotheses {
     ) -> usize {
         self.before.clone_from(poses);
         self.make_room(context, fit);
-        self.unexplained.collect(context, fit.matched(poses));
+        self.unexplained.collect(context.observation.candidates, &fit.correspondences);
         self.refined.clutter = self.unexplained.clutter;
         let (mut steps, by_colors) = (0, context.compares_colors());
         for chain in &context.model.extremities {
@@ -91,7 +88,7 @@ impl Hypotheses {
             let (taken, better) = self.try_proposals(context, fit, poses, predicted);
             steps += taken;
             if better {
-                self.unexplained.collect(context, fit.matched(poses));
+                self.unexplained.collect(context.observation.candidates, &fit.correspondences);
             }
         }
         if by_colors {
@@ -126,7 +123,6 @@ impl Hypotheses {
         }
         let most = context.observation.candidates.len();
         self.rough.make_room(most);
-        make_room(&mut self.clusters.apart, most);
         self.refined.matched.reserve(most.min(context.config.max_limb_points), &fit.correspondences);
     }
 
@@ -134,7 +130,7 @@ impl Hypotheses {
     fn is_due(&mut self, at: Extremity) -> bool {
         let chain = at.chain;
         if at.regions.is_some() {
-            let supports = &at.matched.correspondences.region_support;
+            let supports = &at.correspondences.region_support;
             let sum =
                 |part: fn(&RegionSupport) -> f64| chain.limbs().filter_map(|limb| supports.get(limb)).map(part).sum();
             let [gained, area]: [f64; 2] = [sum(|support| support.gained), sum(|support| support.area)];
@@ -147,14 +143,14 @@ impl Hypotheses {
 
     /// Fills the pool with alternative configurations of one arm or leg.
     fn propose(&mut self, at: Extremity, detection: Option<Detected>) {
-        let Self { rough, clusters, color_directions, pool, .. } = self;
+        let Self { rough, pool, .. } = self;
         rough.begin(at);
-        let current = rough.cost(at, at.matched.poses, f64::INFINITY);
+        let current = rough.cost(at, at.poses, f64::INFINITY);
         pool.begin(current);
-        // All kinds of proposals. To add one, add a file in `proposals` and an element here.
-        let kinds: [&mut dyn Propose; 3] = [clusters, color_directions, &mut DetectedEnd(detection)];
-        for kind in kinds {
-            kind.propose(at, rough, pool);
+        propose_clusters(at, rough, pool);
+        propose_color_directions(at, rough, pool);
+        if let Some(detected) = detection {
+            propose_detected_end(at, detected, rough, pool);
         }
     }
 

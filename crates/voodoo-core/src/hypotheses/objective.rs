@@ -1,12 +1,12 @@
 //! The objective by which poses of a frame are compared: the cost of all terms.
 
-use crate::body::Body;
-use crate::fit::{Context, Matched};
+use crate::association::correspondence::Correspondences;
+use crate::fit::Context;
 use crate::math::Pose;
 use crate::regions::ColorRegions;
 use crate::solver::{OVERLAP_SIGMA, SITE_SCALE};
 use crate::terms::{
-    Colors, DetectedJoints, Floor, FreeSpace, Limits, PATCH, Penetration, Regions, Sites, Stance, Surface, Term,
+    Colors, DetectedJoints, Floor, FreeSpace, Limits, PATCH, Penetration, Regions, Sites, Stance, Term, cost_of_points,
 };
 
 /// Decrease of the cost at which another pose is better, nats: the odds are 20 to 1. An arm or leg is tested only where that much
@@ -14,71 +14,48 @@ use crate::terms::{
 pub(crate) const MARGIN: f64 = 3.0;
 
 /// Negative log-likelihood of poses of a body in a frame, nats.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Objective<'a> {
-    body: &'a Body,
-    matched: Matched<'a>,
+    /// The frame.
+    pub context: Context<'a>,
+    /// The correspondences, and the poses at which they were found.
+    pub correspondences: &'a Correspondences,
+    pub poses: &'a [Pose],
     /// Cost of an unexplained patch in this frame, in those of a usual frame.
-    clutter: f64,
-    /// Weights of all candidates.
-    weights: &'a [f32],
-    surface: Surface<'a>,
-    free_space: FreeSpace<'a>,
-    sites: Sites<'a>,
-    detected: DetectedJoints<'a>,
-    regions: Regions<'a>,
-    limits: Limits,
-    penetration: Penetration<'a>,
-    floor: Option<(Floor, Stance<'a>)>,
+    pub clutter: f64,
+    /// The color regions where they compare poses, with the limbs drawn that are not compared, or the whole body.
+    pub regions: Option<&'a ColorRegions>,
 }
 
-impl<'a> Objective<'a> {
-    /// The objective of matched poses. An unexplained patch costs `clutter` times the usual. `regions` are the color regions where
-    /// they compare poses, with the limbs drawn that are not compared, or the whole body.
-    pub(crate) fn new(
-        context: Context<'a>,
-        matched: Matched<'a>,
-        clutter: f64,
-        regions: Option<&'a ColorRegions>,
-    ) -> Self {
-        let Context { model, observation, config, .. } = context;
-        let colors = regions.map(|regions| Colors { regions, posed: context.posed(matched.poses) });
-        let Matched { correspondences, .. } = matched;
-        let information = 1.0 / (config.point_sigma * config.point_sigma);
-        let (tangential_weight, scale) = (config.tangential_weight, config.kernel_end);
-        Self {
-            body: &model.body,
-            matched,
-            clutter,
-            weights: &observation.candidates.weight,
-            surface: Surface { correspondences, information, tangential_weight, scale },
-            free_space: FreeSpace { views: observation.views },
-            sites: Sites { correspondences, information, scale: SITE_SCALE, biased: true },
-            detected: DetectedJoints { pairs: &correspondences.detected },
-            regions: Regions { pairs: &correspondences.regions, colors },
-            limits: Limits,
-            penetration: Penetration { sigma: OVERLAP_SIGMA, spheres: &[] },
-            floor: observation.floor().map(|plane| {
-                (Floor { plane, sigma: OVERLAP_SIGMA }, Stance { extremities: &model.extremities, floor: plane })
-            }),
-        }
-    }
-
+impl Objective<'_> {
     /// Cost of the pose of one limb but for the points.
     pub(crate) fn limb(&self, poses: &[Pose], limb: usize) -> f64 {
-        let terms: [&dyn Term; 6] =
-            [&self.free_space, &self.sites, &self.detected, &self.regions, &self.limits, &self.penetration];
-        let floor = self.floor.iter().flat_map(|(floor, stance)| [floor as &dyn Term, stance]);
-        terms.into_iter().chain(floor).map(|term| term.cost(self.body, poses, limb)).sum()
+        let Context { model, observation, config, .. } = self.context;
+        let correspondences = self.correspondences;
+        let information = 1.0 / (config.point_sigma * config.point_sigma);
+        let colors = self.regions.map(|regions| Colors { regions, posed: self.context.posed(self.poses) });
+        let terms: [&dyn Term; 6] = [
+            &FreeSpace { views: observation.views },
+            &Sites { correspondences, information, scale: SITE_SCALE, biased: true },
+            &DetectedJoints { pairs: &correspondences.detected },
+            &Regions { pairs: &correspondences.regions, colors },
+            &Limits,
+            &Penetration { sigma: OVERLAP_SIGMA, spheres: &[] },
+        ];
+        let floor = observation.floor().map(|plane| {
+            (Floor { plane, sigma: OVERLAP_SIGMA }, Stance { extremities: &model.extremities, floor: plane })
+        });
+        let floor = floor.iter().flat_map(|(floor, stance)| [floor as &dyn Term, stance]);
+        terms.into_iter().chain(floor).map(|term| term.cost(&model.body, poses, limb)).sum()
     }
 
     /// Cost of the matched poses of the whole body. A point that no limb explains costs a patch of its weight.
     pub(crate) fn body(&self) -> f64 {
-        let poses = self.matched.poses;
-        let limbs = 0..poses.len();
-        let total: f64 = self.weights.iter().map(|weight| f64::from(*weight)).sum();
-        let explained: f64 = limbs.clone().map(|limb| self.surface.cost(self.body, poses, limb)).sum();
-        self.clutter * (PATCH * total + explained) + limbs.map(|limb| self.limb(poses, limb)).sum::<f64>()
+        let weights = &self.context.observation.candidates.weight;
+        let total: f64 = weights.iter().map(|weight| f64::from(*weight)).sum();
+        let explained: f64 = self.correspondences.limbs.iter().map(cost_of_points).sum();
+        let limbs = (0..self.poses.len()).map(|limb| self.limb(self.poses, limb));
+        self.clutter * (PATCH * total + explained) + limbs.sum::<f64>()
     }
 }
 
@@ -99,7 +76,8 @@ mod tests {
             let mut cost = |poses: &Vec<Pose>| {
                 fit.match_last(context, poses);
                 let (before, written) = (poses.clone(), format!("{:?}", fit.correspondences));
-                let cost = || Objective::new(context, fit.matched(poses), 1.0, None).body();
+                let correspondences = &fit.correspondences;
+                let cost = || Objective { context, correspondences, poses, clutter: 1.0, regions: None }.body();
                 assert_eq!(cost().to_bits(), cost().to_bits(), "the cost of the same input must not change");
                 assert_eq!((&before, written), (poses, format!("{:?}", fit.correspondences)));
                 cost()
@@ -136,7 +114,9 @@ mod tests {
                 let mut fit = Fit::new(&config).unwrap();
                 fit.match_last(context, &poses);
                 let all: f32 = context.observation.candidates.weight.iter().sum();
-                (Objective::new(context, fit.matched(&poses), 1.0, None).body(), PATCH * f64::from(all))
+                let correspondences = &fit.correspondences;
+                let objective = Objective { context, correspondences, poses: &poses, clutter: 1.0, regions: None };
+                (objective.body(), PATCH * f64::from(all))
             })
         };
         let alone = before_wall(&model.body, &poses);

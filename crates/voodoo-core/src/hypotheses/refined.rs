@@ -95,7 +95,7 @@ impl Refined {
             fit.regions.draw(context.posed(poses), |_| true);
         }
         let regions = by_colors.then_some(&fit.regions);
-        Objective::new(context, fit.matched(poses), self.clutter, regions).body()
+        Objective { context, correspondences: &fit.correspondences, poses, clutter: self.clutter, regions }.body()
     }
 }
 

@@ -3,18 +3,26 @@
 use std::f64::consts::TAU;
 
 use super::objective::Objective;
-use super::rough_points::{ROUGH_SAMPLE, explain, may_explain, rough_cost};
+use crate::association::correspondence::Correspondences;
+use crate::body::Body;
 use crate::body::two_bone::TwoBone;
-use crate::fit::{Context, Fit, Matched};
-use crate::math::{Aabb, Pose, Vec3, WeightedPoints, make_room, refill, reset};
+use crate::fit::{Context, Fit};
+use crate::math::{Points, Pose, Vec3, WeightedPoints, make_room, refill, reset};
 use crate::regions::ColorRegions;
+use crate::terms::unexplained;
+
+/// Maximum number of points for the rough cost; the time is proportional to it.
+pub(crate) const ROUGH_SAMPLE: usize = 400;
+/// Tolerance of the rough cost for points, in those of a refined pose: refinement pulls nearby points and limbs together.
+const TOLERANCE: f64 = 2.0;
 
 /// The arm or leg under test, and the current poses of the body.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Extremity<'a> {
     pub(super) context: Context<'a>,
     /// The current poses and their correspondences.
-    pub(super) matched: Matched<'a>,
+    pub(super) correspondences: &'a Correspondences,
+    pub(super) poses: &'a [Pose],
     /// Color regions, with the limbs drawn outside the arm or leg; `None` where points were measured.
     pub(super) regions: Option<&'a ColorRegions>,
     pub(super) chain: &'a TwoBone,
@@ -23,17 +31,18 @@ pub(super) struct Extremity<'a> {
 impl<'a> Extremity<'a> {
     pub(super) fn new(context: Context<'a>, fit: &'a Fit, poses: &'a [Pose], chain: &'a TwoBone) -> Self {
         let regions = context.compares_colors().then_some(&fit.regions);
-        Self { context, matched: fit.matched(poses), regions, chain }
+        Self { context, correspondences: &fit.correspondences, poses, regions, chain }
     }
 
     /// Center of its ball joint, working frame.
     pub(super) fn root(&self) -> Vec3 {
-        self.chain.root(&self.context.model.body, self.matched.poses)
+        self.chain.root(&self.context.model.body, self.poses)
     }
 
     /// The objective by which its configurations are compared.
     pub(super) fn objective(&self) -> Objective<'a> {
-        Objective::new(self.context, self.matched, 1.0, self.regions)
+        let Self { context, correspondences, poses, regions, .. } = *self;
+        Objective { context, correspondences, poses, clutter: 1.0, regions }
     }
 }
 
@@ -48,7 +57,8 @@ pub(super) struct RoughSearch {
     /// configuration.
     others: Vec<f32>,
     nearest: Vec<f32>,
-    distances: Vec<f32>,
+    /// Working memory.
+    pub(super) distances: Vec<f32>,
     pub(super) trial: Vec<Pose>,
 }
 
@@ -70,7 +80,7 @@ impl RoughSearch {
         sample.clear();
         sample.extend(&unexplained.points, &unexplained.weights);
         for limb in at.chain.limbs() {
-            let matches = &at.matched.correspondences.limbs[limb];
+            let matches = &at.correspondences.limbs[limb];
             for (index, weight) in matches.weight.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
                 let point = matches.measured.get(index).to_array().map(|value| value as f32);
                 sample.push(point, f64::from(*weight));
@@ -78,13 +88,9 @@ impl RoughSearch {
         }
         sample.subsample(ROUGH_SAMPLE);
         reset(others, sample.len(), f32::INFINITY);
-        let (body, poses) = (&at.context.model.body, at.matched.poses);
-        let bounds = Aabb::from_points((0..sample.len()).map(|index| sample.points.get(index)));
+        let (body, poses) = (&at.context.model.body, at.poses);
         for limb in (0..poses.len()).filter(|limb| at.chain.limbs().all(|own| own != *limb)) {
-            // Most limbs are too far away to explain any point.
-            if may_explain(&body.limbs()[limb].shape, &poses[limb], bounds) {
-                explain(body, limb, poses, &sample.points, others, distances);
-            }
+            explain(body, limb, poses, &sample.points, others, distances);
         }
     }
 
@@ -94,7 +100,8 @@ impl RoughSearch {
         let (chain, body) = (at.chain, &at.context.model.body);
         nearest.clone_from(others);
         chain.limbs().for_each(|limb| explain(body, limb, poses, &sample.points, nearest, distances));
-        let points = rough_cost(nearest, &sample.weights);
+        let near = nearest.iter().zip(&sample.weights);
+        let points = near.map(|(distance, weight)| weight * unexplained(f64::from(*distance) / TOLERANCE)).sum();
         // Only colors lower the cost.
         if at.regions.is_none() && points >= least {
             return points;
@@ -131,7 +138,7 @@ impl RoughSearch {
         best: &mut Vec<Pose>,
     ) -> f64 {
         let mut trial = std::mem::take(&mut self.trial);
-        refill(&mut trial, at.matched.poses.iter().copied());
+        refill(&mut trial, at.poses.iter().copied());
         change(&mut trial);
         let cost = self.cost(at, &trial, least);
         if cost < least {
@@ -139,6 +146,21 @@ impl RoughSearch {
         }
         self.trial = trial;
         if cost < least { cost } else { least }
+    }
+}
+
+/// Updates the distances `least` of points to the nearest of several limbs with one more limb. `distances` is working memory.
+pub(crate) fn explain(
+    body: &Body,
+    limb: usize,
+    poses: &[Pose],
+    points: &Points,
+    least: &mut [f32],
+    distances: &mut Vec<f32>,
+) {
+    body.limbs()[limb].shape.approximate_distances(&poses[limb], points, distances);
+    for (least, distance) in least.iter_mut().zip(distances.iter()) {
+        *least = least.min(distance.abs());
     }
 }
 
@@ -165,7 +187,7 @@ mod tests {
                 fit.match_last(context, &poses);
                 let at = Extremity::new(context, &fit, &poses, arm);
                 let (mut unexplained, mut rough) = (Unexplained::default(), RoughSearch::default());
-                unexplained.collect(context, at.matched);
+                unexplained.collect(context.observation.candidates, at.correspondences);
                 unexplained.near(root, arm.stretched_length(), &mut rough.unexplained);
                 rough.begin(at);
                 let mut best = Vec::new();
@@ -186,7 +208,7 @@ mod tests {
             fit.match_last(context, &poses);
             let at = Extremity::new(context, &fit, &poses, &model.extremities[first_arm(&model)]);
             let mut unexplained = Unexplained::default();
-            unexplained.collect(context, at.matched);
+            unexplained.collect(context.observation.candidates, at.correspondences);
             let mut rough = RoughSearch::default();
             unexplained.near(at.root(), at.chain.stretched_length(), &mut rough.unexplained);
             rough.begin(at);

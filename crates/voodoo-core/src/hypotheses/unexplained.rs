@@ -1,7 +1,8 @@
 //! Candidates that no limb explains.
 
-use crate::fit::{Context, Matched};
+use crate::association::correspondence::Correspondences;
 use crate::math::{Vec3, WeightedPoints, reset};
+use crate::observation::candidates::Candidates;
 use crate::visibility::EXPLAINED;
 
 /// Fraction of the points in a frame that a correct pose usually leaves unexplained, and the cost of a patch there, nats: the
@@ -22,14 +23,13 @@ pub(super) struct Unexplained {
 
 impl Unexplained {
     /// Collects the unexplained candidates of a frame.
-    pub(super) fn collect(&mut self, context: Context, matched: Matched) {
-        let candidates = context.observation.candidates;
+    pub(super) fn collect(&mut self, candidates: &Candidates, correspondences: &Correspondences) {
         let Self { points, clutter, nearest } = self;
         points.clear();
         // Reserved now, so that later steps do not allocate.
         points.reserve(candidates.len());
         reset(nearest, candidates.len(), f32::INFINITY);
-        for matches in &matched.correspondences.limbs {
+        for matches in &correspondences.limbs {
             for (candidate, distance) in matches.candidate.iter().zip(&matches.surface.signed_distance) {
                 let nearest = &mut nearest[*candidate as usize];
                 // A rejected match (to a cap inside the body) still explains its point.
@@ -75,7 +75,7 @@ mod tests {
             let mut fit = Fit::new(&config).unwrap();
             fit.match_last(context, &poses);
             let mut unexplained = Unexplained::default();
-            unexplained.collect(context, fit.matched(&poses));
+            unexplained.collect(context.observation.candidates, &fit.correspondences);
             check(&unexplained);
         });
     }

@@ -4,23 +4,26 @@
 //! all terms, and is not itself lost.
 
 mod detection_check;
-mod person_detector;
 mod segment_search;
 mod trials;
 
 use crate::association::correspondence::Correspondences;
 use crate::body::{Body, Model};
-use crate::detect::{BoundDetector, Detected, PlacedDetection, fit_body, fit_pose, is_sized_like};
+use crate::detect::{
+    BoundDetector, Detected, DetectionQuery, PlacedDetection, Surroundings, fit_body, fit_pose, is_sized_like,
+};
 use crate::fit::{Context, Fit, UNKNOWN_MOTION};
-use crate::math::{Aabb, Pose, Vec3, shifted};
+use crate::math::{Aabb, Pose, Vec3, refill, shifted};
 use crate::observation::candidates::{Candidates, body_box};
-use crate::observation::frame::Ground;
+use crate::observation::frame::{Frame, Ground};
+use crate::observation::observer::Own;
+use crate::observation::ownership::OwnershipMask;
+use crate::observation::segments::Segments;
 use crate::tracker::estimate::Status;
-use detection_check::{DetectionCheck, SIGMAS};
+use detection_check::{DetectionCheck, ELSEWHERE, SIGMAS};
 pub(crate) use detection_check::{DetectionVerdict, Reasons};
 pub(crate) use detection_check::{ENOUGH_ODDS, distance_cost, trunk_is_elsewhere};
-use segment_search::SegmentSearch;
-use trials::Trials;
+use trials::{Trials, try_at};
 
 /// Number of consecutive frames after which a lost body counts as lost.
 const PATIENCE: usize = 2;
@@ -45,7 +48,12 @@ pub(crate) struct Relocalizer {
     candidates: Candidates,
     matched: Correspondences,
     trials: Trials,
-    search: SegmentSearch,
+    /// The poses of the last trial, working frame.
+    found: Vec<Pose>,
+    segments: Segments,
+    /// The last tracked poses, or those that were set, and these turned.
+    tracked: Vec<Pose>,
+    turned: Vec<Pose>,
 }
 
 impl Relocalizer {
@@ -55,7 +63,7 @@ impl Relocalizer {
         self.check = DetectionCheck::default();
         self.detector.bind(&model.body);
         self.floor = None;
-        self.search.remember(poses);
+        refill(&mut self.tracked, poses.iter().copied());
     }
 
     /// Whether the detection of this frame may be of a body of these sizes.
@@ -109,14 +117,15 @@ impl Relocalizer {
             fit.run(Context { observation, ..context }, present, &mut fitted);
         }
         let at = Context { observation, previous: &[], time_scale: UNKNOWN_MOTION, ..context };
-        let better = self.trials.try_at(at, fit, &fitted, &place) && !self.trials.is_somebody_else(at, &fitted);
+        let better = try_at(at, fit, &fitted, &place, &mut self.found)
+            && !self.trials.is_somebody_else(at, &fitted, &self.found);
         fit.swap_matches(&mut self.matched);
         better
     }
 
     /// The poses that a detection or the search found last, working frame.
     pub(crate) fn found(&self) -> &[Pose] {
-        &self.trials.poses
+        &self.found
     }
 
     /// Whether the lost body is searched for: from the frame on from which a loss is not just a blurred image.
@@ -133,38 +142,84 @@ impl Relocalizer {
             self.lost = 0;
         }
         if status == Status::Tracking {
-            self.search.remember(poses);
+            refill(&mut self.tracked, poses.iter().copied());
         }
     }
 
-    /// Searches for a lost body that the detector cannot find. Returns whether it explains the frame better there than at
-    /// `present`. The matches of `fit` are restored before it returns.
-    pub(crate) fn search(&mut self, context: Context, fit: &mut Fit, present: &[Pose]) -> bool {
-        let views = context.observation.views;
-        if !self.is_searching() || self.detector.knows() && !views.frame.images.is_empty() {
-            return false;
-        }
-        self.search.segments.find(views, context.config);
-        fit.swap_matches(&mut self.matched);
-        let found = (0..self.search.segments.found.len()).any(|index| {
-            let segment = self.search.segments.found[index];
-            self.search.is_body_sized(&context.model.body, segment) && {
-                let bounds = segment.bounds.enlarged(context.config.body_box_margin);
-                self.candidates.gather(views, &bounds, context.config);
-                let observation = context.observation.with(&self.candidates);
-                let at = Context { observation, previous: &[], time_scale: UNKNOWN_MOTION, ..context };
-                self.search.try_segment(segment, at, fit, &mut self.trials, present)
-            }
-        });
-        fit.swap_matches(&mut self.matched);
-        found
+    /// Drops the detection of this frame.
+    pub(crate) fn forget(&mut self) {
+        (self.detection, self.person_odds) = (None, None);
     }
+
+    /// Returns the detection of this frame, if there is one.
+    pub(crate) fn detected(&self) -> Option<Detected<'_>> {
+        self.detection.as_ref().map(|detection| Detected { detection: &detection.detection, map: self.detector.map() })
+    }
+
+    /// Returns the pixels of the detection.
+    pub(crate) fn own_pixels(&self) -> Own<'_> {
+        let pixels = self.detection.as_ref().map_or(&[][..], |detection| &detection.detection.pixels);
+        Own { image: self.image, pixels }
+    }
+
+    /// Records how the track was started: `auto_initialized` by the detector, whose detection tells the floor, or by the user.
+    pub(crate) fn record_start(&mut self, auto_initialized: bool) {
+        self.check.auto_initialized = auto_initialized;
+        self.floor = self.detected().filter(|_| auto_initialized).and_then(floor_under);
+    }
+
+    /// Runs the detector on the owned part of a frame where that is due. `root` is the expected position of the body, world frame.
+    pub(crate) fn detect(
+        &mut self,
+        body: &Body,
+        frame: &Frame,
+        ownership: OwnershipMask,
+        root: Vec3,
+        reasons: Reasons,
+    ) {
+        self.forget();
+        if !self.check.is_due(frame.stamp, reasons, ownership.others) || !self.detector.knows() {
+            return;
+        }
+        let query = if reasons.anywhere { DetectionQuery::Any } else { DetectionQuery::Near(root) };
+        for (number, image) in frame.images.iter().enumerate() {
+            let (owners, own) = (ownership.owners(number), Some(ownership.own));
+            let around =
+                Surroundings { ground: frame.ground, excluded: frame.excluded, owners, own, ..Surroundings::default() };
+            for found in self.detector.detect(body, image, &around, query) {
+                // Of several images the nearest detection counts, or the most confident one.
+                let cost = |found: &PlacedDetection| match query {
+                    DetectionQuery::Near(place) => found.root.distance(place),
+                    _ => -found.detection.person,
+                };
+                if self.detection.as_ref().is_none_or(|best| cost(&found) < cost(best)) {
+                    (self.image, self.detection) = (number, Some(found));
+                }
+            }
+            if let (DetectionQuery::Near(place), Some((person, bounds))) = (query, self.detector.nearest())
+                && bounds.contains(place)
+            {
+                self.person_odds = Some(self.person_odds.map_or(person, |before| before.max(person)));
+            }
+        }
+    }
+}
+
+/// Returns the floor on which a detected person stands. A plane at another height than the ankles, such as a table, is not the
+/// floor.
+fn floor_under(detection: Detected) -> Option<Ground> {
+    detection.detection.floor.filter(|floor| {
+        let above = detection.ankles().map(|ankle| floor.normal.dot(ankle.position) - floor.offset);
+        above.fold(f64::INFINITY, f64::min).abs() < ELSEWHERE
+    })
 }
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
+    use crate::body::HumanModel;
+    use crate::detect::{DetectedJoint, Detection, JointMap};
     use crate::testing::{depth, farthest, moved, put_board, standing, turned, with_context, without_background};
 
     /// Returns the poses of a lost body of another kind two frames after it was found. It was last tracked half a meter beside
@@ -181,7 +236,7 @@ mod tests {
             let before = format!("{:?}", fit.correspondences);
             for status in [Status::Tracking, Status::Lost] {
                 relocalizer.observe(status, false, &present);
-                assert!(!relocalizer.search(context, &mut fit, &present));
+                assert!(!relocalizer.is_searching());
             }
             relocalizer.observe(Status::Lost, false, &present);
             let found = relocalizer.search(context, &mut fit, &present);
@@ -242,5 +297,21 @@ mod tests {
     fn a_tracked_body_is_no_longer_lost_and_a_degraded_one_is() {
         let back = |last| after(&[Status::Lost, Status::Lost, last], false);
         assert_eq!([Status::Tracking, Status::Degraded].map(back), [false, true]);
+    }
+
+    #[test]
+    fn a_plane_at_the_ankles_is_the_floor_and_one_at_another_height_is_not() {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let names = ["l_ankle", "r_ankle", "l_shoulder"].map(String::from);
+        let map = JointMap::new(&body, &names, &[]);
+        let is_kept = |offset: f64, ankle: f64| {
+            let joint = |z| Some(DetectedJoint { position: Vec3::new(2.0, 0.0, z), sigma: 0.05, visible: 1.0 });
+            let floor = Some(Ground { normal: Vec3::Z, offset });
+            let detection =
+                Detection { joints: [ankle, ankle, 1.0].map(joint).to_vec(), floor, ..Detection::default() };
+            floor_under(Detected { detection: &detection, map: &map }).is_some()
+        };
+        assert!(is_kept(0.0, 0.08) && is_kept(-0.3, -0.25));
+        assert!(!is_kept(0.7, 0.08) && !is_kept(0.0, 0.6));
     }
 }

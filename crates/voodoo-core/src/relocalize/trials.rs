@@ -6,47 +6,44 @@ use crate::math::{Pose, WeightedPoints, refill, reset};
 use crate::visibility::EXPLAINED;
 
 /// Maximum fraction of the points of a segment that a body found there may leave far from it.
-const STRAY: f64 = 0.15;
+pub(super) const STRAY: f64 = 0.15;
 
 /// Minimum fractions that a body explains alone, if it is somebody else than the one found elsewhere: of what it explains, and of
 /// what either explains. A body that was put behind the person explains little.
 const SOMEBODY_ELSE: [f64; 2] = [0.25, 0.1];
 
-/// Working memory of a trial.
+/// Tries the body at the poses `place`. Returns whether it explains the points there, refined by a few ICP steps, better than the
+/// present pose does; `found` and `fit` then hold the refined pose and its matches.
+pub(super) fn try_at(context: Context, fit: &mut Fit, present: &[Pose], place: &[Pose], found: &mut Vec<Pose>) -> bool {
+    let cost = |fit: &mut Fit, poses: &[Pose]| {
+        fit.match_all(context, poses, context.config.max_steps, true);
+        let correspondences = &fit.correspondences;
+        Objective { context, correspondences, poses, clutter: 1.0, regions: None }.body()
+    };
+    let present_cost = cost(fit, present);
+    refill(found, place.iter().copied());
+    for step in 0..REFINE {
+        fit.match_all(context, found, step, true);
+        fit.solve(context, place, found, step);
+    }
+    cost(fit, found) < present_cost
+}
+
+/// Working memory of trials.
 #[derive(Debug, Default)]
 pub(super) struct Trials {
     /// A sample of the candidates, and their distances to the body.
     sample: WeightedPoints,
     nearest: Vec<f32>,
     distances: Vec<f32>,
-    /// The poses of the last trial, and their start.
-    pub(super) poses: Vec<Pose>,
-    predicted: Vec<Pose>,
 }
 
 impl Trials {
-    /// Tries the body at the poses `place`. Returns whether it explains the points there better than the present pose does.
-    pub(super) fn try_at(&mut self, context: Context, fit: &mut Fit, present: &[Pose], place: &[Pose]) -> bool {
-        fit.match_all(context, present, context.config.max_steps, true);
-        let present_cost = Objective::new(context, fit.matched(present), 1.0, None).body();
-        self.refine(context, fit, place) < present_cost
-    }
-
-    /// Whether the poses of the last trial explain most of the candidates.
-    pub(super) fn explains_most(&mut self, context: Context) -> bool {
-        let poses = std::mem::take(&mut self.poses);
-        let stray = self.stray_fraction(context, &poses);
-        self.poses = poses;
-        stray < STRAY
-    }
-
-    /// Whether the body at `present` is somebody else than at the poses of the last trial: it explains much that is far from these.
-    pub(super) fn is_somebody_else(&mut self, context: Context, present: &[Pose]) -> bool {
-        let poses = std::mem::take(&mut self.poses);
+    /// Whether the body at `present` is somebody else than at `found`: it explains much that is far from there.
+    pub(super) fn is_somebody_else(&mut self, context: Context, present: &[Pose], found: &[Pose]) -> bool {
         self.measure_distances(context, present);
         let here = self.nearest.clone();
-        self.measure_distances(context, &poses);
-        self.poses = poses;
+        self.measure_distances(context, found);
         let (mut alone, mut own, mut either) = (0.0, 0.0, 0.0);
         for ((here, there), weight) in here.iter().zip(&self.nearest).zip(&self.sample.weights) {
             let [here, there] = [here, there].map(|distance| f64::from(*distance) <= 2.0 * EXPLAINED);
@@ -77,18 +74,5 @@ impl Trials {
         for limb in 0..poses.len() {
             explain(&context.model.body, limb, poses, &sample.points, nearest, distances);
         }
-    }
-
-    /// Refines `place` by a few ICP steps and returns its cost; `poses` and `fit` then hold the refined pose and its matches.
-    fn refine(&mut self, context: Context, fit: &mut Fit, place: &[Pose]) -> f64 {
-        let Self { poses, predicted, .. } = self;
-        refill(poses, place.iter().copied());
-        predicted.clone_from(poses);
-        for step in 0..REFINE {
-            fit.match_all(context, poses, step, true);
-            fit.solve(context, predicted, poses, step);
-        }
-        fit.match_all(context, poses, context.config.max_steps, true);
-        Objective::new(context, fit.matched(poses), 1.0, None).body()
     }
 }

@@ -25,7 +25,7 @@ pub(crate) use prior::{Prior, Rest};
 pub(crate) use regions::{Colors, Regions};
 pub(crate) use sites::{APART, Sites};
 pub(crate) use stance::Stance;
-pub(crate) use surface::{Surface, unexplained};
+pub(crate) use surface::{Surface, cost_of_points, unexplained};
 
 use crate::association::correspondence::Correspondences;
 use crate::body::Body;

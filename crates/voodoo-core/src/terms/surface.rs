@@ -36,13 +36,12 @@ impl Term for Surface<'_> {
             sums.add_to(block, matches.radius_variance);
         }
     }
+}
 
-    /// The cost of the points matched to a limb less that of unexplained points, at the poses where they were matched.
-    fn cost(&self, _body: &Body, _poses: &[Pose], limb: usize) -> f64 {
-        let matches = &self.correspondences.limbs[limb];
-        let pairs = matches.weight.iter().zip(&matches.surface.signed_distance);
-        pairs.map(|(weight, distance)| f64::from(*weight) * (unexplained(f64::from(*distance)) - PATCH)).sum()
-    }
+/// The cost of the points matched to a limb less that of unexplained points, at the poses where they were matched, nats.
+pub(crate) fn cost_of_points(matches: &LimbMatches) -> f64 {
+    let pairs = matches.weight.iter().zip(&matches.surface.signed_distance);
+    pairs.map(|(weight, distance)| f64::from(*weight) * (unexplained(f64::from(*distance)) - PATCH)).sum()
 }
 
 /// Cost of a point of weight one at this distance from the surface, nats.

@@ -331,7 +331,7 @@ impl BodyTracker {
             sizes.refine_girths(setting, model, poses, fit, |limb| assessor.is_reliable(limb));
         }
         // Assessment: status of the body and its limbs.
-        assessor.assess(setting.with_model(model), fit.matched(poses), relocalizer.detected());
+        assessor.assess(setting.with_model(model), &fit.correspondences, poses, relocalizer.detected());
         if config.regions {
             fit.regions.learn(frame);
         }
@@ -417,7 +417,7 @@ impl BodyTracker {
         let setting = Setting { config, observation, previous, time_scale: 1.0 };
         fit.match_all(setting.with_model(model), poses, config.max_steps, true);
         assessor.moved();
-        assessor.assess(setting.with_model(model), fit.matched(poses), None);
+        assessor.assess(setting.with_model(model), &fit.correspondences, poses, None);
     }
 
     /// Index of the image and pixels of the detection to which the body was moved in this frame: they show no scene.

@@ -7,7 +7,7 @@ use crate::body::Limb;
 use crate::math::{Pose, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::depth_view::{DepthView, DepthViews};
-use crate::visibility::surface::{PatchVisibility, surface_rows};
+use crate::visibility::surface::{PatchVisibility, SurfacePlace, surface_rows};
 use crate::visibility::{ALONG_LIMB, LIMB_RIM};
 
 /// Patches of a limb that face a camera inside its image.
@@ -33,17 +33,18 @@ impl Patches {
 /// Returns the patches of a limb's surface that are visible to the cameras, occluded, and in free space.
 pub(crate) fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose) -> Patches {
     let mut found = Patches::default();
-    views.iter().for_each(|view| found.add(limb_visibility_in(&view, limb, working_from_limb, |_| false)));
+    views.iter().for_each(|view| found.add(limb_visibility_in(&view, limb, working_from_limb, |_| false, |_| ())));
     found
 }
 
 /// Like [`limb_visibility`], in one image. Patches that another limb hides, at points (camera frame) for which `hidden` is true,
-/// are occluded as well.
+/// are occluded as well. `each` gets the points of every section: at one rim, in the middle, and at the other rim.
 pub(crate) fn limb_visibility_in(
     view: &DepthView,
     limb: &Limb,
     working_from_limb: &Pose,
     hidden: impl Fn(Vec3) -> bool,
+    mut each: impl FnMut([SurfacePlace; 3]),
 ) -> Patches {
     let (shape, across) = (&limb.shape, [-LIMB_RIM, 0.0, LIMB_RIM]);
     let mut found = Patches::default();
@@ -55,7 +56,9 @@ pub(crate) fn limb_visibility_in(
         let aslant = row.facing.across.length() / (camera_from_limb * section.center()).length();
         let patches = aslant * 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length()
             / (REFERENCE_PATCH * (ALONG_LIMB.len() * across.len()) as f64);
-        for place in row.places(view, across) {
+        let places = row.places(view, across);
+        each(places);
+        for place in places {
             match place.sight() {
                 PatchVisibility::Unknown => continue,
                 PatchVisibility::FreeSpace => found.free_space += patches,

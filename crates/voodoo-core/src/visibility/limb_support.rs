@@ -1,9 +1,14 @@
-//! Measures which parts of an arm or leg the cameras observe and only that limb explains.
+//! Measures which parts of an arm or leg the cameras observe and only that limb explains, and whether the surface that a body was
+//! fitted to is round where its limbs are.
 //!
 //! An arm placed on the trunk fits the trunk's points, and every camera observes some surface there, so neither confirms its
 //! pose. A point on its surface does if no other part of the posed body occludes it, the camera observes a surface there, and the
 //! body would leave that surface unexplained without this arm. Limbs of the same arm or leg do not compete with each other: they
 //! overlap at their joint.
+//!
+//! Points explained to a few centimeters and limbs observed at their depths hardly rule out a flat object as large as a person, such
+//! as a cupboard. But the surface of a body recedes from the camera between the middle of a limb and its rims; that of a door does
+//! not.
 
 use crate::body::Body;
 use crate::body::two_bone::TwoBone;
@@ -12,7 +17,7 @@ use crate::observation::depth_view::{DepthView, DepthViews};
 use crate::visibility::EXPLAINED;
 use crate::visibility::evidence::{Patches, limb_visibility_in};
 use crate::visibility::render::LimbRaycaster;
-use crate::visibility::surface::{PatchVisibility, surface_rows};
+use crate::visibility::surface::{PatchVisibility, SurfacePlace, surface_rows};
 use crate::visibility::{ACROSS_LIMB, ALONG_LIMB, OVERLAP};
 
 /// Evidence of the cameras on a limb.
@@ -42,6 +47,11 @@ impl LimbSupport {
 
 /// Evaluates the upper and lower limbs of all `chains`, and counts the patches of every limb; `supports` gets one entry per limb,
 /// `raycasters` is working memory.
+///
+/// Returns how far the observed surface recedes between the middle of limbs and their rims, relative to the model: approximately
+/// one on a body, zero on a plane: the sums of the least-squares factor's numerator and denominator, m^2. The factor is between both
+/// over all sections where the middle and the rims are observed near the model. The two rims are averaged, so that the direction of
+/// a limb relative to the camera has no effect.
 pub(crate) fn measure_support(
     views: DepthViews,
     body: &Body,
@@ -49,13 +59,23 @@ pub(crate) fn measure_support(
     chains: &[TwoBone],
     raycasters: &mut Vec<LimbRaycaster>,
     supports: &mut Vec<LimbSupport>,
-) {
+) -> [f64; 2] {
     reset(supports, poses.len(), LimbSupport::default());
+    let (mut product, mut square) = (0.0, 0.0);
     for view in views.iter() {
         refill(raycasters, LimbRaycaster::of_body(body, poses, view.working_from_camera));
         for (limb, support) in supports.iter_mut().enumerate() {
             let hidden = |point| is_hidden(raycasters, limb, point);
-            support.patches.add(limb_visibility_in(&view, &body.limbs()[limb], &poses[limb], hidden));
+            let measure_round = |places: [SurfacePlace; 3]| {
+                let depths = places.map(|place| Some([place.point.z, place.depth_within(2.0 * EXPLAINED)?]));
+                if let [Some(left), Some(middle), Some(right)] = depths {
+                    let [expected, measured] = [0, 1].map(|kind| 0.5 * (left[kind] + right[kind]) - middle[kind]);
+                    product += expected * measured;
+                    square += expected * expected;
+                }
+            };
+            let (own, pose) = (&body.limbs()[limb], &poses[limb]);
+            support.patches.add(limb_visibility_in(&view, own, pose, hidden, measure_round));
         }
         for chain in chains {
             for limb in [chain.upper, chain.lower] {
@@ -69,6 +89,7 @@ pub(crate) fn measure_support(
             }
         }
     }
+    [product, square]
 }
 
 /// Whether another limb hides a point of a limb, camera frame.

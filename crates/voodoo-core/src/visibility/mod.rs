@@ -1,13 +1,12 @@
 //! Predicts what cameras observe of a posed body and compares it with the images.
 //!
-//! `render` predicts a depth image, `evidence` scores how well a pose explains the frame, `limb_support` measures what only one
-//! arm or leg explains, and `roundness` checks whether the observed surface is round as limbs are. `evidence`, `limb_support` and
-//! `roundness` sample the points of `surface`.
+//! `render` predicts a depth image, `evidence` scores how well a pose explains the frame, and `limb_support` measures what only one
+//! arm or leg explains, and whether the observed surface is round as limbs are. `evidence` and `limb_support` sample the points of
+//! `surface`.
 
 pub(crate) mod evidence;
 pub(crate) mod limb_support;
 pub(crate) mod render;
-pub(crate) mod roundness;
 pub(crate) mod surface;
 
 /// Offset of the outermost points across a limb, as a fraction of its radius; nearer to the rim, a pixel may show the background.

@@ -13,29 +13,24 @@
 //!
 //! A body with more than a quarter of its limbs not measured is not tracked.
 
-mod detected;
 mod edges;
 mod exclusive;
 mod limb_filter;
-mod two_state;
 
 use super::estimate::{Estimate, LimbStatus, Status};
-use crate::association::correspondence::SitePair;
+use crate::association::correspondence::{Correspondences, SitePair};
 use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Model};
 use crate::detect::Detected;
-use crate::fit::{Context, Matched};
+use crate::fit::Context;
 use crate::math::{Pose, Vec3, refill, reset};
 use crate::terms::APART;
 use crate::uncertainty::EdgeFilter;
 use crate::visibility::limb_support::{LimbSupport, measure_support};
 use crate::visibility::render::LimbRaycaster;
-use crate::visibility::roundness::roundness;
 use crate::visibility::{EXPLAINED, FEW, LITTLE};
-use detected::detection_log_odds;
 use exclusive::Exclusive;
-use limb_filter::LimbFilter;
-use two_state::{EVEN, all_log_odds, any_log_odds, probability, support_log_odds};
+use limb_filter::{EVEN, LimbFilter, all_log_odds, any_log_odds, is_uncertain, probability, support_log_odds};
 
 /// Weight of past frames in the sums of the roundness: a single blurred frame must not make the body flat.
 const ROUNDNESS_MEMORY: f64 = 0.9;
@@ -65,8 +60,6 @@ pub(super) struct Assessor {
     internal: Vec<LimbStatus>,
     /// Log odds that each limb is right, of which its reported status and probability are functions.
     log_odds: Vec<f64>,
-    /// Evidence of this frame for each limb, other than that of patches for arms and legs: log odds.
-    evidence: Vec<f64>,
     exclusive: Exclusive,
     raycasters: Vec<LimbRaycaster>,
     supports: Vec<LimbSupport>,
@@ -107,7 +100,7 @@ impl Assessor {
         let mut limbs = extremities.iter().flat_map(|chain| [chain.upper, chain.lower]);
         self.status != Status::Tracking
             || self.internal.contains(&LimbStatus::Lost)
-            || limbs.any(|limb| self.limbs.get(limb).is_some_and(LimbFilter::is_uncertain))
+            || limbs.any(|limb| self.limbs.get(limb).is_some_and(|limb| is_uncertain(limb.log_odds[0])))
     }
 
     /// Whether the tracker relies on a limb: its internal status is measured.
@@ -117,12 +110,19 @@ impl Assessor {
 
     /// Updates the internal status of the body and its limbs. `detected` is the detection of this frame, if there is one and the
     /// pose was not taken from it.
-    pub(super) fn assess(&mut self, context: Context, matched: Matched, detected: Option<Detected>) {
-        if context.observation.candidates.is_empty() && matched.correspondences.sites.is_empty() {
+    pub(super) fn assess(
+        &mut self,
+        context: Context,
+        correspondences: &Correspondences,
+        poses: &[Pose],
+        detected: Option<Detected>,
+    ) {
+        if context.observation.candidates.is_empty() && correspondences.sites.is_empty() {
             // Nothing was measured, and earlier evidence does not count for this frame.
             self.limbs.clear();
         }
-        self.update_limbs(context, matched, detected);
+        let [product, square] = self.update_limbs(context, correspondences, poses);
+        self.weigh_evidence(context, poses, detected);
         let Self { limbs, internal, log_odds, .. } = self;
         refill(log_odds, limbs.iter().map(|limb| limb.log_odds[0]));
         refill(internal, limbs.iter().map(|limb| limb.status(limb.log_odds[0])));
@@ -134,7 +134,6 @@ impl Assessor {
             }
         }
         self.status = overall(internal, |limb| limbs[limb].is_visible());
-        let [product, square] = roundness(context.observation.views, &context.model.body, matched.poses);
         if square > 0.0 {
             let [products, squares] = self.round.map(|sum| ROUNDNESS_MEMORY * sum);
             self.round = [products + product, squares + square];
@@ -168,13 +167,13 @@ impl Assessor {
         estimate.status = if status == Status::Tracking && doubtful { Status::Degraded } else { status };
     }
 
-    /// Updates the filter of every limb with this frame.
-    fn update_limbs(&mut self, context: Context, matched: Matched, detected: Option<Detected>) {
-        let (body, views, poses) = (&context.model.body, context.observation.views, matched.poses);
+    /// Updates the filter of every limb with this frame. Returns the roundness of the observed surface, see [`measure_support`].
+    fn update_limbs(&mut self, context: Context, correspondences: &Correspondences, poses: &[Pose]) -> [f64; 2] {
+        let (body, views) = (&context.model.body, context.observation.views);
         self.limbs.resize(poses.len(), LimbFilter::default());
         self.exclusive.count(body, poses, context.observation.candidates);
-        measure_support(views, body, poses, &context.model.extremities, &mut self.raycasters, &mut self.supports);
-        self.evidence.clear();
+        let Self { raycasters, supports, .. } = self;
+        let round = measure_support(views, body, poses, &context.model.extremities, raycasters, supports);
         for (limb, filter) in self.limbs.iter_mut().enumerate() {
             let support = &mut self.supports[limb];
             let patches = support.patches;
@@ -192,34 +191,33 @@ impl Assessor {
             let site = |pair: &SitePair| pair.limb == limb && near(pair);
             // Hip sites measure the pelvis, and shoulder sites the clavicles, where no depth image covers these limbs.
             let joined = |pair: &SitePair| unseen && near(pair) && limb_joined_at(body, poses, pair) == Some(limb);
-            if matched.correspondences.sites.iter().any(|pair| site(pair) || joined(pair)) {
+            if correspondences.sites.iter().any(|pair| site(pair) || joined(pair)) {
                 now = [OF_EXCLUSIVE, 0.0, 1.0];
                 support.known = false;
             }
             // Without depth coverage, color images give the evidence.
-            if let Some(colors) = matched.correspondences.region_support.get(limb).filter(|_| unseen && now[0] == 0.0) {
+            if let Some(colors) = correspondences.region_support.get(limb).filter(|_| unseen && now[0] == 0.0) {
                 now = [OF_EXCLUSIVE * colors.own * colors.visible, colors.against, colors.visible];
             }
             // Depth images do not contradict a limb that point clouds of other sensors measure.
             support.known &= self.exclusive.clouds[limb] < FEW;
             [_, filter.contradicted, filter.visible] = now;
-            self.evidence.push(support_log_odds(now[0]));
+            filter.evidence = support_log_odds(now[0]);
             let far_end =
                 |poses: &[Pose]| poses.get(limb).map(|pose| *pose * (body.limbs()[limb].shape.length() * Vec3::Z));
             filter
                 .moved(far_end(poses).zip(far_end(context.previous)).map_or(Vec3::ZERO, |(now, before)| now - before));
         }
-        self.weigh_evidence(context, matched, detected);
+        round
     }
 
     /// Updates the odds of every limb with the evidence of this frame and of a detection, if there is one.
-    fn weigh_evidence(&mut self, context: Context, matched: Matched, detected: Option<Detected>) {
-        let poses = matched.poses;
-        let Self { limbs, supports, evidence, .. } = self;
+    fn weigh_evidence(&mut self, context: Context, poses: &[Pose], detected: Option<Detected>) {
+        let Self { limbs, supports, .. } = self;
         let (model, origin) = (context.model, context.observation.origin());
         for (limb, filter) in limbs.iter_mut().enumerate() {
             if model.extremities.iter().all(|chain| chain.limbs().all(|own| own != limb)) {
-                filter.observe([evidence[limb]; 2], 0.0, 0.0);
+                filter.observe([filter.evidence; 2], 0.0, 0.0);
             }
         }
         for chain in &model.extremities {
@@ -233,7 +231,7 @@ impl Assessor {
                 [all_log_odds(&[upper, any_log_odds(upper_end, lower)]); 2],
                 [all_log_odds(&[upper, lower]), all_log_odds(&[upper, lower, lower_end])],
             ];
-            let others = [evidence[chain.upper], all_log_odds(&both.map(|limb| evidence[limb]))];
+            let others = [limbs[chain.upper].evidence, all_log_odds(&both.map(|limb| limbs[limb].evidence))];
             let unexpected = limbs[chain.upper].unexpected.max(limbs[chain.lower].unexpected);
             let next = [Some(chain.lower), chain.ends.first().copied()];
             for (number, limb) in both.into_iter().enumerate() {
@@ -247,6 +245,23 @@ impl Assessor {
             }
         }
     }
+}
+
+/// Returns the log odds that a limb's pose is right, from the detected positions of the proximal joints of `limbs`: the limb
+/// itself and the next one. The sum over both joints contradicts a limb if the detection is far from most of it, even if one
+/// joint agrees. Poses are in the working frame, whose origin in the world is `origin`.
+fn detection_log_odds(detected: Detected, body: &Body, poses: &[Pose], origin: Vec3, limbs: [Option<usize>; 2]) -> f64 {
+    let apart = |limb: usize| {
+        let (parent, joint) = body.limbs()[limb].parent.as_ref()?;
+        let detected = detected.hangs_by(limb)?;
+        let tracked = poses[*parent] * joint.parent_from_joint.translation + origin;
+        // For a right joint the expected square along an axis is the variance. The tracked position has the tolerance `EXPLAINED`,
+        // the distance within which a limb explains a point.
+        let variance = detected.sigma * detected.sigma + EXPLAINED * EXPLAINED;
+        let apart = (tracked - detected.position).to_array();
+        Some(apart.iter().map(|along| 0.5 * (1.0 - along * along / variance)).sum::<f64>())
+    };
+    limbs.into_iter().flatten().filter_map(apart).sum()
 }
 
 /// Returns the parent of the site's limb if the site lies at the joint between the two, so that it measures the parent, too. Body
@@ -281,8 +296,8 @@ fn overall(limbs: &[LimbStatus], is_visible: impl Fn(usize) -> bool) -> Status {
 mod tests {
     use super::super::estimate::SourceReport;
     use super::*;
-    use crate::association::correspondence::Correspondences;
     use crate::body::LimbRole;
+    use crate::detect::{DetectedJoint, Detection, JointMap};
     use crate::fit::Fit;
     use crate::observation::candidates::Candidates;
     use crate::observation::frame::Frame;
@@ -294,7 +309,7 @@ mod tests {
         with_context(pixels, &config, &model, poses, |context| {
             let mut fit = Fit::new(&config).unwrap();
             fit.match_last(context, poses);
-            (0..frames).for_each(|_| assessor.assess(context, fit.matched(poses), None));
+            (0..frames).for_each(|_| assessor.assess(context, &fit.correspondences, poses, None));
         });
     }
 
@@ -381,8 +396,7 @@ mod tests {
             let (frame, candidates) = (Frame::empty(1.0), Candidates::default());
             let mut observation = context.observation.with(&candidates);
             (observation.views.frame, observation.views.segmented) = (&frame, &[]);
-            let matched = Matched { correspondences: &Correspondences::default(), poses: &poses };
-            assessor.assess(Context { observation, ..context }, matched, None);
+            assessor.assess(Context { observation, ..context }, &Correspondences::default(), &poses, None);
         });
         assert_eq!(reported(&assessor).status, Status::Lost);
     }
@@ -470,6 +484,31 @@ mod tests {
             [half, quarter, few],
             [Status::Degraded, Status::Degraded, Status::Lost],
             "the others are out of view"
+        );
+    }
+
+    /// Log odds of the first arm's limbs for a detection with this standard deviation that is displaced by `aside`.
+    fn log_odds(aside: Vec3, sigma: f64) -> [f64; 2] {
+        let (model, poses) = standing();
+        let body = &model.body;
+        let names: Vec<String> = body.sites().iter().map(|site| site.name.clone()).collect();
+        let place = |site| body.site_position(&poses, site) + aside + Vec3::X;
+        let joint = |site| Some(DetectedJoint { position: place(site), sigma, visible: 1.0 });
+        let detection = Detection { joints: (0..names.len()).map(joint).collect(), ..Detection::default() };
+        let detected = Detected { detection: &detection, map: &JointMap::new(body, &names, &[]) };
+        let arm = &model.extremities[0];
+        [(arm.upper, Some(arm.lower)), (arm.lower, arm.ends.first().copied())]
+            .map(|(limb, next)| detection_log_odds(detected, body, &poses, Vec3::X, [Some(limb), next]))
+    }
+
+    #[test]
+    fn a_detection_supports_a_near_limb_and_contradicts_a_far_one_according_to_its_sigma() {
+        for (there, aside) in log_odds(Vec3::ZERO, 0.03).into_iter().zip(log_odds(0.2 * Vec3::X, 0.03)) {
+            assert!((there - 3.0).abs() < 1e-9 && aside < -10.0, "{there} {aside}");
+        }
+        assert!(
+            log_odds(0.2 * Vec3::X, 0.2).iter().all(|value| *value > 0.0),
+            "a detection of large sigma does not contradict"
         );
     }
 }
