@@ -5,11 +5,11 @@
 /// A configuration entry that is unknown or outside its range.
 ///
 /// ```
-/// use voodoo_core::{Config, ConfigError, RawValue};
+/// use voodoo_core::{Config, ConfigError, Value};
 ///
 /// let mut config = Config::default();
-/// config.set("solver", &RawValue::Word("tree".into()))?;
-/// let refused = config.set("threads", &RawValue::Number(0.0));
+/// config.set("solver", &Value::Word("tree".into()))?;
+/// let refused = config.set("threads", &Value::Whole(0));
 /// assert!(matches!(refused, Err(ConfigError::Value { key: "threads", .. })));
 /// assert_eq!(config.threads, 1);
 /// # Ok::<(), ConfigError>(())
@@ -28,7 +28,7 @@ pub enum ConfigError {
         /// The expected value.
         expected: String,
         /// The value found.
-        found: RawValue,
+        found: Value,
     },
 }
 
@@ -36,15 +36,27 @@ pub enum ConfigError {
 ///
 /// [`Field`] has an example.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(untagged))]
 pub enum Value {
-    /// A real number.
+    /// A real number. Without a fraction, it also sets an entry that is a whole number.
     Real(f64),
     /// A whole number.
     Whole(usize),
     /// A Boolean.
     Switch(bool),
     /// One of several keywords.
-    Word(&'static str),
+    Word(String),
+}
+
+impl Value {
+    /// The number, if it is one.
+    fn number(&self) -> Option<f64> {
+        match *self {
+            Self::Real(number) => Some(number),
+            Self::Whole(number) => Some(number as f64),
+            _ => None,
+        }
+    }
 }
 
 /// Description of a configuration entry.
@@ -84,15 +96,12 @@ trait Entry: Sized {
     const EXPECTED: &'static str;
     const WORDS: &'static [&'static str] = &[];
     fn value(&self) -> Value;
-    fn parse(value: &RawValue) -> Option<Self>;
+    fn parse(value: &Value) -> Option<Self>;
 }
 
 /// A value from outside as an entry, checked for type and range.
-fn parsed<T: Entry>(key: &'static str, value: &RawValue, range: Option<(f64, f64)>) -> Result<T, ConfigError> {
-    let within = match (value, range) {
-        (RawValue::Number(number), Some((low, high))) => (low..=high).contains(number),
-        _ => true,
-    };
+fn parsed<T: Entry>(key: &'static str, value: &Value, range: Option<(f64, f64)>) -> Result<T, ConfigError> {
+    let within = value.number().zip(range).is_none_or(|(number, (low, high))| (low..=high).contains(&number));
     T::parse(value).filter(|_| within).ok_or_else(|| {
         let expected = match range {
             Some((low, high)) => format!("{} from {low} to {high}", T::EXPECTED),
@@ -102,29 +111,13 @@ fn parsed<T: Entry>(key: &'static str, value: &RawValue, range: Option<(f64, f64
     })
 }
 
-/// A value from outside, not yet validated.
-///
-/// [`ConfigError`] has an example.
-#[derive(Clone, Debug, PartialEq)]
-pub enum RawValue {
-    /// A number.
-    Number(f64),
-    /// A Boolean.
-    Switch(bool),
-    /// A keyword.
-    Word(String),
-}
-
 impl Entry for f64 {
     const EXPECTED: &'static str = "a number";
     fn value(&self) -> Value {
         Value::Real(*self)
     }
-    fn parse(value: &RawValue) -> Option<Self> {
-        match value {
-            RawValue::Number(number) if number.is_finite() => Some(*number),
-            _ => None,
-        }
+    fn parse(value: &Value) -> Option<Self> {
+        value.number().filter(|number| number.is_finite())
     }
 }
 
@@ -133,13 +126,9 @@ impl Entry for usize {
     fn value(&self) -> Value {
         Value::Whole(*self)
     }
-    fn parse(value: &RawValue) -> Option<Self> {
-        match value {
-            RawValue::Number(number) if *number >= 0.0 && number.fract() == 0.0 && *number < 1e9 => {
-                Some(*number as usize)
-            }
-            _ => None,
-        }
+    fn parse(value: &Value) -> Option<Self> {
+        let is_whole = |number: &f64| *number >= 0.0 && number.fract() == 0.0 && *number < 1e9;
+        value.number().filter(is_whole).map(|number| number as usize)
     }
 }
 
@@ -148,9 +137,9 @@ impl Entry for bool {
     fn value(&self) -> Value {
         Value::Switch(*self)
     }
-    fn parse(value: &RawValue) -> Option<Self> {
+    fn parse(value: &Value) -> Option<Self> {
         match value {
-            RawValue::Switch(switch) => Some(*switch),
+            Value::Switch(switch) => Some(*switch),
             _ => None,
         }
     }
@@ -168,11 +157,11 @@ macro_rules! words {
             const EXPECTED: &'static str = "one of ";
             const WORDS: &'static [&'static str] = &[$($word),+];
             fn value(&self) -> Value {
-                Value::Word(match self { $(Self::$variant => $word),+ })
+                Value::Word(match self { $(Self::$variant => $word),+ }.to_owned())
             }
-            fn parse(value: &RawValue) -> Option<Self> {
+            fn parse(value: &Value) -> Option<Self> {
                 match value {
-                    $(RawValue::Word(word) if word == $word => Some(Self::$variant),)+
+                    $(Value::Word(word) if word == $word => Some(Self::$variant),)+
                     _ => None,
                 }
             }
@@ -218,7 +207,7 @@ macro_rules! config {
             }
 
             /// Sets one entry, checked for type and range.
-            pub fn set(&mut self, key: &str, value: &RawValue) -> Result<(), ConfigError> {
+            pub fn set(&mut self, key: &str, value: &Value) -> Result<(), ConfigError> {
                 match key {
                     $(stringify!($name) => {
                         self.$name = parsed(stringify!($name), value, config!(@range $($low $high)?))?;

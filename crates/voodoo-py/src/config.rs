@@ -2,7 +2,8 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use voodoo_core::{Config, RawValue, Value};
+use pythonize::{depythonize, pythonize};
+use voodoo_core::{Config, Value};
 
 use crate::errors::ConfigError;
 
@@ -16,12 +17,7 @@ pub(crate) fn config_fields(py: Python<'_>) -> PyResult<Vec<FieldRow<'_>>> {
         .fields()
         .into_iter()
         .map(|field| {
-            let default = match field.default {
-                Value::Real(number) => number.into_pyobject(py)?.into_any(),
-                Value::Whole(number) => number.into_pyobject(py)?.into_any(),
-                Value::Switch(switch) => switch.into_pyobject(py)?.to_owned().into_any(),
-                Value::Word(word) => word.into_pyobject(py)?.into_any(),
-            };
+            let default = pythonize(py, &field.default)?;
             Ok((field.name, field.doc, field.unit, default, field.range, field.words.to_vec()))
         })
         .collect()
@@ -32,12 +28,9 @@ pub(crate) fn config(values: &Bound<'_, PyDict>) -> PyResult<Config> {
     let mut config = Config::default();
     for (key, value) in values.iter() {
         let key: String = key.extract()?;
-        let number = |_| value.extract().map(RawValue::Number);
-        let word = |_: PyErr| value.extract().map(RawValue::Word);
-        let raw = value.extract().map(RawValue::Switch).or_else(number).or_else(word);
-        let wrong = || format!("{key}: expected a number, a switch or a word, found {value}");
-        let raw = raw.map_err(|_: PyErr| ConfigError::new_err(wrong()))?;
-        config.set(&key, &raw).map_err(|error| ConfigError::new_err(error.to_string()))?;
+        let wrong = |_| ConfigError::new_err(format!("{key}: expected a number, a switch or a word, found {value}"));
+        let found: Value = depythonize(&value).map_err(wrong)?;
+        config.set(&key, &found).map_err(|error| ConfigError::new_err(error.to_string()))?;
     }
     Ok(config)
 }
