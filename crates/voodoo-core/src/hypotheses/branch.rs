@@ -144,7 +144,7 @@ mod tests {
         with_context(&pixels, &config, &model, first, |context| {
             let (mut branch, mut fit) = (Branch::default(), Fit::new(&config).unwrap());
             branch.motion.restart(other.to_vec());
-            fit.match_last(context, first);
+            fit.match_last(context, first, true);
             let (mut poses, mut predicted) = (first.to_vec(), first.to_vec());
             let mut refined = Refined { clutter: 1.0, ..Refined::default() };
             let steps = branch.compare(context, &mut refined, &mut fit, &mut poses, &mut predicted);

@@ -21,7 +21,7 @@ use crate::math::{Pose, make_room};
 use crate::terms::PATCH;
 use crate::visibility::LITTLE;
 use branch::Branch;
-use proposals::{Pool, propose_clusters, propose_color_directions, propose_detected_end};
+use proposals::{propose_clusters, propose_color_directions, propose_detected_end};
 use refined::{Refined, is_elsewhere};
 use rough::{Extremity, RoughSearch};
 use unexplained::Unexplained;
@@ -34,7 +34,9 @@ const UNLIKE_FRAME: f64 = 0.85;
 pub(crate) struct Hypotheses {
     unexplained: Unexplained,
     rough: RoughSearch,
-    pool: Pool,
+    /// Proposals for one arm or leg in the order in which they are refined: the poses of the whole body, or none. They explain points
+    /// or colors best, are stretched through unexplained points, or end at the detected position.
+    proposals: [Vec<Pose>; 3],
     refined: Refined,
     /// The second branch of the body, fitted to the same color images.
     pub(crate) branch: Branch,
@@ -96,7 +98,7 @@ impl Hypotheses {
         }
         if by_colors && steps > 0 {
             // The last evaluated poses may be those of a rejected hypothesis.
-            fit.match_last(context, poses);
+            fit.match_last(context, poses, true);
         }
         steps
     }
@@ -116,9 +118,8 @@ impl Hypotheses {
 
     /// Reserves memory for the body and all candidates of the frame, so that later steps do not allocate.
     fn make_room(&mut self, context: Context, fit: &Fit) {
-        let Self { rough, pool: Pool { points, stretched, detected, .. }, refined, branch, .. } = self;
-        let Refined { poses, tried, .. } = refined;
-        for poses in [&mut rough.trial, points, stretched, detected, poses, tried, &mut branch.tried] {
+        let Self { rough, proposals, refined: Refined { poses, tried, .. }, branch, .. } = self;
+        for poses in proposals.iter_mut().chain([&mut rough.trial, poses, tried, &mut branch.tried]) {
             make_room(poses, context.model.body.limbs().len());
         }
         let most = context.observation.candidates.len();
@@ -141,16 +142,17 @@ impl Hypotheses {
         PATCH * self.unexplained.clutter * near.total() >= MARGIN
     }
 
-    /// Fills the pool with alternative configurations of one arm or leg.
+    /// Proposes alternative configurations of one arm or leg.
     fn propose(&mut self, at: Extremity, detection: Option<Detected>) {
-        let Self { rough, pool, .. } = self;
+        let Self { rough, proposals, .. } = self;
+        proposals.iter_mut().for_each(Vec::clear);
+        let [best, stretched, detected] = proposals;
         rough.begin(at);
-        let current = rough.cost(at, at.poses, f64::INFINITY);
-        pool.begin(current);
-        propose_clusters(at, rough, pool);
-        propose_color_directions(at, rough, pool);
-        if let Some(detected) = detection {
-            propose_detected_end(at, detected, rough, pool);
+        let least = rough.cost(at, at.poses, f64::INFINITY) - MARGIN;
+        let least = propose_clusters(at, rough, least, [&mut *best, stretched]);
+        propose_color_directions(at, rough, least, best);
+        if let Some(detection) = detection {
+            propose_detected_end(at, detection, rough, detected);
         }
     }
 
@@ -163,11 +165,11 @@ impl Hypotheses {
         poses: &mut Vec<Pose>,
         predicted: &mut Vec<Pose>,
     ) -> (usize, bool) {
-        if self.pool.found().next().is_none() {
+        if self.proposals.iter().all(Vec::is_empty) {
             return (0, false);
         }
         let (mut steps, mut improved, mut current) = (0, false, self.refined.cost(context, fit, poses));
-        for proposal in self.pool.found() {
+        for proposal in self.proposals.iter().filter(|poses| !poses.is_empty()) {
             let (taken, better) = self.refined.replace(context, fit, poses, predicted, current, proposal);
             steps += taken;
             if better {
@@ -198,7 +200,7 @@ mod tests {
             let (pixels, previous) = (before_wall(&model.body, truth), poses.clone());
             let mut predicted = previous.clone();
             with_context(&pixels, &config, &model, &previous, |context| {
-                fit.match_last(context, &poses);
+                fit.match_last(context, &poses, true);
                 let steps = hypotheses.improve(context, &mut fit, &mut poses, &mut predicted, None);
                 assert_eq!(poses == previous, predicted == previous, "poses and prediction change together");
                 found.push((poses.clone(), steps));
@@ -240,7 +242,7 @@ mod tests {
         with_context(&pixels, &config, &model, &poses, |context| {
             let (mut fit, mut refined) = (Fit::new(&config).unwrap(), Refined::default());
             refined.clutter = 1.0;
-            fit.match_last(context, &poses);
+            fit.match_last(context, &poses, true);
             let before = format!("{:?}", fit.correspondences);
             let current = refined.cost(context, &mut fit, &poses);
             // One that is the current pose needs no step.

@@ -6,7 +6,7 @@ use crate::math::Pose;
 use crate::regions::ColorRegions;
 use crate::solver::{OVERLAP_SIGMA, SITE_SCALE};
 use crate::terms::{
-    Colors, DetectedJoints, Floor, FreeSpace, Limits, PATCH, Penetration, Regions, Sites, Stance, Term, cost_of_points,
+    DetectedJoints, Floor, Limits, PATCH, Penetration, Sites, Term, cost_of_points, free_space_cost, stance_cost,
 };
 
 /// Decrease of the cost at which another pose is better, nats: the odds are 20 to 1. An arm or leg is tested only where that much
@@ -30,23 +30,20 @@ pub(crate) struct Objective<'a> {
 impl Objective<'_> {
     /// Cost of the pose of one limb but for the points.
     pub(crate) fn limb(&self, poses: &[Pose], limb: usize) -> f64 {
-        let Context { model, observation, config, .. } = self.context;
-        let correspondences = self.correspondences;
+        let Self { context, correspondences, regions, .. } = *self;
+        let Context { model, observation, config, .. } = context;
         let information = 1.0 / (config.point_sigma * config.point_sigma);
-        let colors = self.regions.map(|regions| Colors { regions, posed: self.context.posed(self.poses) });
-        let terms: [&dyn Term; 6] = [
-            &FreeSpace { views: observation.views },
-            &Sites { correspondences, information, scale: SITE_SCALE, biased: true },
-            &DetectedJoints { pairs: &correspondences.detected },
-            &Regions { pairs: &correspondences.regions, colors },
-            &Limits,
-            &Penetration { sigma: OVERLAP_SIGMA, spheres: &[] },
-        ];
-        let floor = observation.floor().map(|plane| {
-            (Floor { plane, sigma: OVERLAP_SIGMA }, Stance { extremities: &model.extremities, floor: plane })
-        });
-        let floor = floor.iter().flat_map(|(floor, stance)| [floor as &dyn Term, stance]);
-        terms.into_iter().chain(floor).map(|term| term.cost(&model.body, poses, limb)).sum()
+        let (body, pairs, floor) = (&model.body, &correspondences.detected, observation.floor());
+        let cost = |term: &dyn Term| term.cost(body, poses, limb);
+        let of_colors = |regions: &ColorRegions| -PATCH * regions.pixel_gain(context.posed(poses), limb)[0];
+        free_space_cost(observation.views, &body.limbs()[limb], &poses[limb])
+            + cost(&Sites { correspondences, information, scale: SITE_SCALE, biased: true })
+            + cost(&DetectedJoints { pairs })
+            + regions.map_or(0.0, of_colors)
+            + cost(&Limits)
+            + cost(&Penetration { sigma: OVERLAP_SIGMA, spheres: &[] })
+            + floor.map_or(0.0, |plane| cost(&Floor { plane, sigma: OVERLAP_SIGMA }))
+            + floor.map_or(0.0, |floor| stance_cost(floor, model, poses, limb))
     }
 
     /// Cost of the matched poses of the whole body. A point that no limb explains costs a patch of its weight.
@@ -74,7 +71,7 @@ mod tests {
         with_context(&pixels, &config, model, truth, |context| {
             let mut fit = Fit::new(&config).unwrap();
             let mut cost = |poses: &Vec<Pose>| {
-                fit.match_last(context, poses);
+                fit.match_last(context, poses, true);
                 let (before, written) = (poses.clone(), format!("{:?}", fit.correspondences));
                 let correspondences = &fit.correspondences;
                 let cost = || Objective { context, correspondences, poses, clutter: 1.0, regions: None }.body();
@@ -112,7 +109,7 @@ mod tests {
         let cost = |pixels: &[u16]| {
             with_context(pixels, &config, &model, &poses, |context| {
                 let mut fit = Fit::new(&config).unwrap();
-                fit.match_last(context, &poses);
+                fit.match_last(context, &poses, true);
                 let all: f32 = context.observation.candidates.weight.iter().sum();
                 let correspondences = &fit.correspondences;
                 let objective = Objective { context, correspondences, poses: &poses, clutter: 1.0, regions: None };

@@ -1,9 +1,8 @@
-//! Proposals of alternative configurations of an arm or leg, one function for each kind. Each writes its best configuration to a
-//! [`Pool`] if it is worth refining.
+//! Proposals of alternative configurations of an arm or leg, one function for each kind. Each writes the poses of the body with its
+//! best configuration, if that is worth refining.
 
 use std::f64::consts::{PI, TAU};
 
-use super::MARGIN;
 use super::rough::{Extremity, RoughSearch};
 use crate::detect::Detected;
 use crate::math::{Pose, Vec3, WeightedPoints, refill};
@@ -15,43 +14,23 @@ use crate::visibility::FEW;
 /// arm or leg. The time is proportional to all of them.
 pub(crate) const SWIVELS: usize = 6;
 
-/// Proposals for one arm or leg, one of each kind in the order in which they are refined: the poses of the whole body, or none.
-#[derive(Debug, Default)]
-pub(super) struct Pool {
-    /// The configuration of lowest rough cost, and that cost; initially the highest that is worth refining.
-    pub(super) points: Vec<Pose>,
-    least: f64,
-    /// It is stretched through unexplained points.
-    pub(super) stretched: Vec<Pose>,
-    /// The end is at its detected position.
-    pub(super) detected: Vec<Pose>,
-}
-
-impl Pool {
-    /// Removes all proposals. The current configuration costs `current`.
-    pub(super) fn begin(&mut self, current: f64) {
-        let Self { points, stretched, detected, .. } = self;
-        [points, stretched, detected].into_iter().for_each(Vec::clear);
-        self.least = current - MARGIN;
-    }
-
-    /// The proposals, in the order in which they are refined.
-    pub(super) fn found(&self) -> impl Iterator<Item = &Vec<Pose>> {
-        [&self.points, &self.stretched, &self.detected].into_iter().filter(|poses| !poses.is_empty())
-    }
-}
-
 /// Proposes an arm or leg that ends at a cluster of unexplained points, and one that is stretched through it: at the clusters that
-/// are farthest from the root and from each other.
-pub(super) fn propose_clusters(at: Extremity, rough: &mut RoughSearch, pool: &mut Pool) {
+/// are farthest from the root and from each other. Both have to cost less than `least`. Returns the cost of the first, or `least`.
+pub(super) fn propose_clusters(
+    at: Extremity,
+    rough: &mut RoughSearch,
+    mut least: f64,
+    [ending, stretched]: [&mut Vec<Pose>; 2],
+) -> f64 {
     let ends = end_proposals(&rough.unexplained, at.root(), &mut rough.distances);
-    let mut stretched = pool.least;
+    let mut least_stretched = least;
     for end in ends.into_iter().flatten() {
         // A hand that lies on another limb leaves only the points of its forearm, which a stretched arm passes.
         let beyond = at.root() + (end - at.root()).normalize() * at.chain.stretched_length();
-        stretched = rough.end_at(at, beyond, 1, stretched, &mut pool.stretched);
-        pool.least = rough.end_at(at, end, SWIVELS, pool.least, &mut pool.points);
+        least_stretched = rough.end_at(at, beyond, 1, least_stretched, stretched);
+        least = rough.end_at(at, end, SWIVELS, least, ending);
     }
+    least
 }
 
 /// Positions for the end: centroids of clusters, selected by farthest-point sampling from the root. `apart` is working memory.
@@ -85,8 +64,8 @@ fn end_proposals(cluster: &WeightedPoints, root: Vec3, apart: &mut Vec<f32>) -> 
 }
 
 /// Proposes the directions that explain the colors best: of the upper limb among directions on a sphere, then of the lower limb
-/// at the best of these.
-pub(super) fn propose_color_directions(at: Extremity, rough: &mut RoughSearch, pool: &mut Pool) {
+/// at the best of these. It has to cost less than `least`.
+pub(super) fn propose_color_directions(at: Extremity, rough: &mut RoughSearch, mut least: f64, best: &mut Vec<Pose>) {
     if at.regions.is_none() {
         return;
     }
@@ -95,7 +74,7 @@ pub(super) fn propose_color_directions(at: Extremity, rough: &mut RoughSearch, p
         let bend = at.root() + at.chain.lengths[0] * upper;
         for lower in directions() {
             let change = |poses: &mut [Pose]| at.chain.place_between(body, poses, bend, bend + lower);
-            pool.least = rough.changed(at, change, pool.least, &mut pool.points);
+            least = rough.changed(at, change, least, best);
         }
     }
 }
@@ -131,11 +110,11 @@ fn directions() -> impl Iterator<Item = Vec3> {
 }
 
 /// Proposes an arm or leg that ends at the detected hand, wrist or ankle.
-pub(super) fn propose_detected_end(at: Extremity, detected: Detected, rough: &mut RoughSearch, pool: &mut Pool) {
+pub(super) fn propose_detected_end(at: Extremity, detected: Detected, rough: &mut RoughSearch, best: &mut Vec<Pose>) {
     let Some(end) = detected_end(at, detected) else { return };
     let place = end - at.context.observation.origin();
     // The bend is searched for, because a detected elbow or knee is no more accurate than the wrist or ankle.
-    rough.end_at(at, place, 2 * SWIVELS, f64::INFINITY, &mut pool.detected);
+    rough.end_at(at, place, 2 * SWIVELS, f64::INFINITY, best);
 }
 
 /// Detected position of the chain's end, world frame: a joint detected on its last limb, or the detected wrist or ankle plus the

@@ -51,7 +51,7 @@ impl Refined {
         if cost < settled - MARGIN && is_another(context, &self.tried, &self.poses) {
             refill(predicted, hypothesis.iter().copied());
             poses.clone_from(&self.tried);
-            fit.match_last(context, poses);
+            fit.match_last(context, poses, true);
         } else if settled < current - MARGIN && is_another(context, &self.poses, poses) {
             predicted.clone_from(poses);
             poses.clone_from(&self.poses);
@@ -84,7 +84,7 @@ impl Refined {
             fit.match_all(here, &self.poses, at, step.is_multiple_of(2) || 2 * step < REFINE);
             fit.solve(here, hypothesis, &mut self.poses, at);
         }
-        fit.match_last(context, &self.poses);
+        fit.match_last(context, &self.poses, true);
         (REFINE, self.cost(context, fit, &self.poses))
     }
 

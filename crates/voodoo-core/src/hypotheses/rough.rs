@@ -184,7 +184,7 @@ mod tests {
             arm.reach(&model.body, &mut raised_pose, place, TAU * f64::from(bend) / 6.0);
             with_context(&before_wall(&model.body, &raised_pose), &config, &model, &poses, |context| {
                 let mut fit = Fit::new(&config).unwrap();
-                fit.match_last(context, &poses);
+                fit.match_last(context, &poses, true);
                 let at = Extremity::new(context, &fit, &poses, arm);
                 let (mut unexplained, mut rough) = (Unexplained::default(), RoughSearch::default());
                 unexplained.collect(context.observation.candidates, at.correspondences);
@@ -205,7 +205,7 @@ mod tests {
         let (pixels, config) = (before_wall(&model.body, &raised_pose), without_background());
         with_context(&pixels, &config, &model, &poses, |context| {
             let mut fit = Fit::new(&config).unwrap();
-            fit.match_last(context, &poses);
+            fit.match_last(context, &poses, true);
             let at = Extremity::new(context, &fit, &poses, &model.extremities[first_arm(&model)]);
             let mut unexplained = Unexplained::default();
             unexplained.collect(context.observation.candidates, at.correspondences);

@@ -73,7 +73,7 @@ mod tests {
         let (pixels, config) = (before_wall(&model.body, truth), without_background());
         with_context(&pixels, &config, &model, &poses, |context| {
             let mut fit = Fit::new(&config).unwrap();
-            fit.match_last(context, &poses);
+            fit.match_last(context, &poses, true);
             let mut unexplained = Unexplained::default();
             unexplained.collect(context.observation.candidates, &fit.correspondences);
             check(&unexplained);

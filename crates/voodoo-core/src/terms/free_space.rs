@@ -1,7 +1,7 @@
 //! Free space: a limb's surface does not lie where a camera observes something behind it.
 
-use super::{PATCH, Term};
-use crate::body::Body;
+use super::PATCH;
+use crate::body::Limb;
 use crate::math::Pose;
 use crate::observation::depth_view::DepthViews;
 use crate::visibility::evidence::limb_visibility;
@@ -9,15 +9,8 @@ use crate::visibility::evidence::limb_visibility;
 /// Cost of a patch that violates free space, in unexplained patches.
 const VIOLATION: f64 = 0.6;
 
-/// Patches of the surface that violate free space. It moves none: [`super::Contour`] moves a limb to the edge of what is observed.
-#[derive(Debug)]
-pub(crate) struct FreeSpace<'a> {
-    /// The depth images.
-    pub views: DepthViews<'a>,
-}
-
-impl Term for FreeSpace<'_> {
-    fn cost(&self, body: &Body, poses: &[Pose], limb: usize) -> f64 {
-        VIOLATION * PATCH * limb_visibility(self.views, &body.limbs()[limb], &poses[limb]).free_space
-    }
+/// Cost of the patches of a limb's surface that violate free space, nats. They move no limb: [`super::Contour`] moves it to the edge of
+/// what is observed.
+pub(crate) fn free_space_cost(views: DepthViews, limb: &Limb, pose: &Pose) -> f64 {
+    VIOLATION * PATCH * limb_visibility(views, limb, pose).free_space
 }

@@ -17,14 +17,14 @@ mod surface;
 pub(crate) use contour::Contour;
 pub(crate) use detected::DetectedJoints;
 pub(crate) use floor::Floor;
-pub(crate) use free_space::FreeSpace;
+pub(crate) use free_space::free_space_cost;
 pub(crate) use limits::Limits;
 pub(crate) use penetration::Penetration;
 pub(crate) use posture::Posture;
 pub(crate) use prior::{Prior, Rest};
-pub(crate) use regions::{Colors, Regions};
+pub(crate) use regions::Regions;
 pub(crate) use sites::{APART, Sites};
-pub(crate) use stance::Stance;
+pub(crate) use stance::stance_cost;
 pub(crate) use surface::{Surface, cost_of_points, unexplained};
 
 use crate::association::correspondence::Correspondences;
@@ -43,10 +43,10 @@ const LARGEST_COST: f64 = 10.0;
 ///
 /// The solver linearizes a term at poses that differ by millimeters. Poses that differ by centimeters are compared by its cost,
 /// which is limited, because no model of an error holds far away, and lower than the sum of squares, because nearby measurements
-/// err alike.
+/// err alike. What only tells such poses apart, and moves none, is a function of its cost.
 pub(crate) trait Term {
-    /// Adds gradient and information at `poses` (working frame). Terms that move nothing have none.
-    fn add(&self, _body: &Body, _poses: &[Pose], _normal: &mut NormalEquations) {}
+    /// Adds gradient and information at `poses` (working frame).
+    fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations);
 
     /// Negative log-likelihood of the pose of one limb, nats. Terms that do not tell such poses apart have none.
     fn cost(&self, _body: &Body, _poses: &[Pose], _limb: usize) -> f64 {
@@ -76,7 +76,7 @@ impl Term for Measurements<'_> {
             &Surface { correspondences, information, tangential_weight: config.tangential_weight, scale },
             &Sites { correspondences, information, scale: site_scale, biased },
             &Contour { pairs: &correspondences.contour, information: edge_information, scale },
-            &Regions { pairs: &correspondences.regions, colors: None },
+            &Regions { pairs: &correspondences.regions },
         ];
         for term in terms {
             term.add(body, poses, normal);

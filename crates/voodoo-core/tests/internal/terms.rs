@@ -213,7 +213,7 @@ proptest! {
             }).collect()
         };
         let add = |poses: &[Pose], system: &mut NormalEquations| {
-            Regions { pairs: &pairs_at(poses), colors: None }.add(&body, poses, system);
+            Regions { pairs: &pairs_at(poses) }.add(&body, poses, system);
         };
         check(&body, &poses, &add, &|poses| pairs_at(poses).iter().map(|pair| pair.information * pair.distance.powi(2)).sum())?;
     }
