@@ -9,9 +9,8 @@ use crate::config::Config;
 use crate::error::TrackError;
 
 /// Threads that share the work of a step.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Threads {
-    count: usize,
     /// `None`: the calling thread does everything.
     pool: Option<ThreadPool>,
     /// The process in which they run.
@@ -24,7 +23,7 @@ impl Threads {
         let pool = started(config.threads).map_err(|error| {
             TrackError::measurement("threads", "a number of threads the system can start", error.to_string())
         })?;
-        Ok(Self { count: config.threads, pool, process: process::id() })
+        Ok(Self { pool, process: process::id() })
     }
 
     /// Does `work` on every item, with its index. Each is processed by one thread, so the result does not depend on their number.
@@ -39,8 +38,10 @@ impl Threads {
     /// end: it starts its own; if the system cannot, the calling thread does everything, with the same result.
     fn pool(&mut self) -> Option<&ThreadPool> {
         if self.process != process::id() {
-            mem::forget(self.pool.take());
-            self.pool = started(self.count).ok().flatten();
+            if let Some(pool) = self.pool.take() {
+                self.pool = started(pool.current_num_threads()).ok().flatten();
+                mem::forget(pool);
+            }
             self.process = process::id();
         }
         self.pool.as_ref()

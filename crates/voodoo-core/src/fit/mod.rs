@@ -26,7 +26,7 @@ use crate::threads::Threads;
 pub(crate) const CONTOUR_FROM: usize = 2;
 
 /// Fits the pose to a frame, starting from a nearby pose. Keeps the last correspondences.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Fit {
     warm_start: WarmStart,
     whole_body: WholeBody,
@@ -50,20 +50,7 @@ pub(crate) struct Fit {
 impl Fit {
     /// Starts the threads of a configuration.
     pub(crate) fn new(config: &Config) -> Result<Self, TrackError> {
-        Ok(Self {
-            warm_start: WarmStart::default(),
-            whole_body: WholeBody::default(),
-            assignment: Assignment::default(),
-            buried: Buried::default(),
-            correspondences: Correspondences::default(),
-            contours: Contours::default(),
-            regions: regions::ColorRegions::default(),
-            detected: Vec::new(),
-            detected_limbs: DetectedLimbs::default(),
-            radius_variances: Vec::new(),
-            band_weights: Vec::new(),
-            threads: Threads::new(config)?,
-        })
+        Ok(Self { threads: Threads::new(config)?, ..Self::default() })
     }
 
     /// Sets the detection of this frame, if there is one, whose joints are fitted as well; `poses` are the expected ones.
@@ -118,7 +105,7 @@ impl Fit {
             before = distance;
         }
         // The last steps hardly moved anything, so points stay assigned to their limbs where they are assigned.
-        self.match_end(context, poses, steps == 0 || !kind.is_whole_body());
+        self.match_last(context, poses, steps == 0 || !kind.is_whole_body());
         steps
     }
 
@@ -139,12 +126,7 @@ impl Fit {
     }
 
     /// Like `match_all`, after the last step, without the contour, which has no effect any more.
-    pub(crate) fn match_last(&mut self, context: Context, poses: &[Pose]) {
-        self.match_end(context, poses, true);
-    }
-
-    /// Like `match_last`; `anew` states whether points are assigned to limbs anew.
-    fn match_end(&mut self, context: Context, poses: &[Pose], anew: bool) {
+    pub(crate) fn match_last(&mut self, context: Context, poses: &[Pose], anew: bool) {
         let gate = Gate::new(context.config, context.config.max_steps);
         if anew {
             self.assign(context, poses, &gate);
@@ -176,8 +158,9 @@ impl Fit {
         self.regions.find_single_edges(context.posed(poses), &mut self.correspondences.regions);
     }
 
-    /// Computes the relative changes of length, one for each pair of limbs, that best fit the correspondences; see
-    /// [`WholeBody::lengths`]. Returns false when the solver cannot estimate lengths.
+    /// Writes the relative changes of the lengths of `pairs` of limbs that fit the correspondences at `poses` to `change`. On input,
+    /// `change` holds the change from each length to the one it is regularized to, with information `pull`. Returns false when
+    /// the lengths are not determined, or the solver cannot estimate them.
     pub(crate) fn lengths(
         &mut self,
         context: Context,
@@ -188,8 +171,12 @@ impl Fit {
         change: &mut [f64],
     ) -> bool {
         let Self { whole_body, correspondences, .. } = self;
-        let problem = Problem { context, correspondences, predicted, step: context.config.max_steps };
-        context.config.solver.is_whole_body() && whole_body.lengths(problem, poses, pairs, pull, change)
+        let step = context.config.max_steps;
+        context.config.solver.is_whole_body() && {
+            // A site with a bias cannot measure a length.
+            whole_body.sum_terms(Problem { context, correspondences, predicted, step }, poses, false);
+            whole_body.chain.lengths(&context.model.body, poses, pairs, pull, change)
+        }
     }
 
     /// Warm start: follows the measured positions of named sites before the frame's steps.

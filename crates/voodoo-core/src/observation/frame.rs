@@ -484,3 +484,11 @@ fn check_place(what: impl Display, place: Vec3) -> Result<(), TrackError> {
 pub(crate) fn check_pose(what: impl Display, pose: &Pose) -> Result<(), TrackError> {
     TrackError::unless(is_rigid(pose), what, "a rigid transform", format_args!("{pose:?}"))
 }
+
+/// Rejects other than one valid pose for each limb.
+pub(crate) fn check_poses(body: &Body, world_from_limb: &[Pose]) -> Result<(), TrackError> {
+    let [poses, limbs] = [world_from_limb.len(), body.limbs().len()];
+    let found = format_args!("{poses} poses for {limbs} limbs, or one not finite");
+    let valid = poses == limbs && world_from_limb.iter().all(is_rigid);
+    TrackError::unless(valid, "world_from_limb", "one rigid pose a limb", found)
+}

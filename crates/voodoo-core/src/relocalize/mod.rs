@@ -66,19 +66,15 @@ impl Relocalizer {
         refill(&mut self.tracked, poses.iter().copied());
     }
 
-    /// Whether the detection of this frame may be of a body of these sizes.
-    pub(crate) fn detects_sizes_of(&self, body: &Body) -> bool {
-        self.detected().is_none_or(|detected| is_sized_like(body, detected, SIGMAS))
-    }
-
     /// Returns the body and its poses, world frame, that fit best the detection of this frame. The body is `set`, the one that is
-    /// known, or has the detected sizes where none is or these clearly differ.
-    pub(crate) fn fit_detected(&self, model: &Model, set: Option<&Body>) -> Option<(Body, Vec<Pose>)> {
+    /// known, or has the detected sizes where none is or these clearly differ. Also returns whether it is `set`.
+    pub(crate) fn fit_detected(&self, model: &Model, set: Option<&Body>) -> Option<(Body, Vec<Pose>, bool)> {
         let detected = self.detected()?;
-        match set.filter(|set| is_sized_like(set, detected, SIGMAS)) {
-            Some(set) => Some((set.clone(), fit_pose(set, detected)?)),
-            None => fit_body(&model.reference_body, detected),
+        if let Some(set) = set.filter(|set| is_sized_like(set, detected, SIGMAS)) {
+            return Some((set.clone(), fit_pose(set, detected)?, true));
         }
+        let (body, poses) = fit_body(&model.reference_body, detected)?;
+        Some((body, poses, false))
     }
 
     /// Compares the detection of this frame with a body at these poses, working frame, whose origin is at `origin` in the world.
@@ -232,7 +228,7 @@ mod tests {
         relocalizer.restart(&model, &present);
         with_context(pixels, &config, &model, &present, |context| {
             let mut fit = Fit::new(&config).unwrap();
-            fit.match_last(context, &present);
+            fit.match_last(context, &present, true);
             let before = format!("{:?}", fit.correspondences);
             for status in [Status::Tracking, Status::Lost] {
                 relocalizer.observe(status, false, &present);

@@ -353,7 +353,7 @@ mod tests {
             sizes.restart(&model, start, &config);
             sizes.set_radius_sigmas(&model.body, &mut fit);
             with_setting(&pixels, &config, &model, &poses, |setting| {
-                fit.match_last(setting.with_model(&model), &poses)
+                fit.match_last(setting.with_model(&model), &poses, true)
             });
             fit.correspondences.limbs[0].radius_variance.sqrt()
         };

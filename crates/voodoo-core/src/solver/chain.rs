@@ -12,6 +12,8 @@ use crate::terms::normal_equations::NormalEquations;
 /// Working memory of the chain solver.
 #[derive(Debug, Default)]
 pub(crate) struct ChainSolver {
+    /// The normal equations of the limbs, to which terms add.
+    pub(crate) normal: NormalEquations,
     pub(super) chain: Chain,
     pub(super) screws: Vec<Vector6<f64>>,
     pub(super) composite: Vec<(Matrix6<f64>, Vector6<f64>)>,
@@ -22,19 +24,22 @@ pub(crate) struct ChainSolver {
     pub(super) mixed: Vec<f64>,
     pub(super) reduced: Vec<f64>,
     pub(super) gradient: Vec<f64>,
+    /// Of covariances: columns of the half-solved system, one row per unknown; and the unknowns that move a limb, last one first.
+    pub(super) rows: Vec<[f64; 6]>,
+    pub(super) moving: Vec<usize>,
 }
 
 impl ChainSolver {
     /// One damped step from the normal equations at `poses`, scaled by `stride`; afterwards the joints are exactly closed.
-    pub(crate) fn step(&mut self, body: &Body, normal: &NormalEquations, stride: f64, poses: &mut [Pose]) {
-        self.assemble(body, normal, poses, DAMPING);
+    pub(crate) fn step(&mut self, body: &Body, stride: f64, poses: &mut [Pose]) {
+        self.assemble(body, poses, DAMPING);
         if solve_in_place(&mut self.h, &mut self.step, self.chain.freedoms) {
             self.apply(body, stride, poses);
         }
     }
 
-    pub(super) fn assemble(&mut self, body: &Body, normal: &NormalEquations, poses: &[Pose], damping: f64) {
-        let Self { chain, screws, composite, h, step, .. } = self;
+    pub(super) fn assemble(&mut self, body: &Body, poses: &[Pose], damping: f64) {
+        let Self { normal, chain, screws, composite, h, step, .. } = self;
         chain.layout(body);
         let n = chain.freedoms;
         list_screws(body, poses, screws);

@@ -5,29 +5,15 @@ use nalgebra::{Matrix6, Vector6};
 use super::ChainSolver;
 use crate::body::Body;
 use crate::math::{Pose, Vec3, factor, refill};
-use crate::terms::normal_equations::{NormalEquations, line};
+use crate::terms::normal_equations::line;
 
-/// Information of a body's limbs at some poses, and the covariances that follow from it.
-#[derive(Debug, Default)]
-pub(crate) struct Spread {
-    /// The normal equations of the limbs.
-    pub(crate) normal: NormalEquations,
-    /// Assembles and factors them.
-    pub(crate) system: ChainSolver,
-    /// Columns of the half-solved system, one row per unknown.
-    rows: Vec<[f64; 6]>,
-    /// Unknowns that move the queried limb, last one first.
-    moving: Vec<usize>,
-}
-
-impl Spread {
-    /// Assembles the limbs' information at `poses`, lets `add` change its lower triangle over all unknowns, and factors the result.
-    /// Returns false when it is not positive definite.
+impl ChainSolver {
+    /// Assembles the limbs' information at `poses`, lets `add` change its lower triangle over all unknowns, and factors the result,
+    /// from which covariances follow. Returns false when it is not positive definite.
     pub(crate) fn factor(&mut self, body: &Body, poses: &[Pose], add: impl FnOnce(&mut [f64])) -> bool {
-        let Self { normal, system, .. } = self;
-        system.assemble(body, normal, poses, 0.0);
-        add(&mut system.h);
-        factor(&mut system.h, system.chain.freedoms)
+        self.assemble(body, poses, 0.0);
+        add(&mut self.h);
+        factor(&mut self.h, self.chain.freedoms)
     }
 
     /// Covariance of a limb's pose about the `origin` of its frame: rotation in world axes (radians), then translation (meters).
@@ -40,7 +26,7 @@ impl Spread {
 
     /// Covariance of the unknowns of a limb's own joint, in their order; for the root: of its rotation, then of its translation.
     pub(crate) fn of_joint(&mut self, limb: usize) -> Matrix6<f64> {
-        let own = self.system.chain.unknowns(limb);
+        let own = self.chain.unknowns(limb);
         self.covariance(limb, |unknown, _| {
             let number = unknown.checked_sub(own.start);
             std::array::from_fn(|index| if number == Some(index) { 1.0 } else { 0.0 })
@@ -50,7 +36,7 @@ impl Spread {
     /// Covariance of six sums of the unknowns that move a limb. `derivatives` returns those of all six with respect to an unknown,
     /// of which the twist is given.
     fn covariance(&mut self, limb: usize, derivatives: impl Fn(usize, &Vector6<f64>) -> [f64; 6]) -> Matrix6<f64> {
-        let Self { system: ChainSolver { chain, screws, h, .. }, rows, moving, .. } = self;
+        let Self { chain, screws, h, rows, moving, .. } = self;
         let n = chain.freedoms;
         rows.resize(n, [0.0; 6]);
         refill(moving, chain.up_from(limb).flat_map(|limb| chain.unknowns(limb).rev()));
@@ -97,17 +83,17 @@ mod tests {
         let (model, poses) = standing();
         let (poses, _) = raised(&model, &poses, 0.3);
         let body = &model.body;
-        let mut spread = Spread::default();
+        let mut spread = ChainSolver::default();
         spread.normal.clear(poses.len());
         for (limb, own) in spread.normal.limbs.iter_mut().enumerate() {
             own.h = block(limb);
         }
-        spread.system.chain.layout(body);
-        let n = spread.system.chain.freedoms;
+        spread.chain.layout(body);
+        let n = spread.chain.freedoms;
         let own: Vec<f64> = (0..n).map(|index| 1.0 + (index % 5) as f64).collect();
         let add = |h: &mut [f64]| h.iter_mut().step_by(n + 1).zip(&own).for_each(|(value, own)| *value += own);
         assert!(spread.factor(body, &poses, add));
-        let ChainSolver { chain, screws, .. } = &spread.system;
+        let ChainSolver { chain, screws, .. } = &spread;
         // The dense reference: every limb's twist as a matrix over all unknowns.
         let moves = |limb: usize, unknown: usize| {
             let mut ancestor = limb;
@@ -148,7 +134,7 @@ mod tests {
                     assert!((found[(i, j)] - dense[(i, j)]).abs() < 1e-9 * scale, "limb {limb}: {i}, {j}");
                 }
             }
-            let (joint, own) = (spread.of_joint(limb), spread.system.chain.unknowns(limb));
+            let (joint, own) = (spread.of_joint(limb), spread.chain.unknowns(limb));
             for i in 0..own.len() {
                 for j in 0..own.len() {
                     let dense = inverse[(own.start + i, own.start + j)];

@@ -5,7 +5,6 @@ use nalgebra::Vector6;
 use super::{ChainSolver, LENGTH_INFORMATION};
 use crate::body::{Body, Pair};
 use crate::math::{Pose, Vec3, dot, factor, half_substitute, reset, solve_in_place};
-use crate::terms::normal_equations::NormalEquations;
 
 impl ChainSolver {
     /// Writes the relative change of length of each pair to `change`: the Gauss-Newton step of the lengths after elimination of
@@ -13,13 +12,12 @@ impl ChainSolver {
     pub(crate) fn lengths(
         &mut self,
         body: &Body,
-        normal: &NormalEquations,
         poses: &[Pose],
         pairs: &[Pair],
         pull: &[f64],
         change: &mut [f64],
     ) -> bool {
-        self.assemble(body, normal, poses, 0.0);
+        self.assemble(body, poses, 0.0);
         self.couple(body, poses, pairs);
         if !factor(&mut self.h, self.chain.freedoms) {
             return false;
@@ -34,7 +32,7 @@ impl ChainSolver {
     }
 
     /// Returns the information of the relative length of each of `pairs` on its own, with the pose unknowns eliminated. Uses the
-    /// factorization of [`super::Spread::factor`].
+    /// factorization of [`Self::factor`].
     pub(crate) fn length_information(
         &mut self,
         body: &Body,

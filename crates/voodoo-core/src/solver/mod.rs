@@ -2,10 +2,10 @@
 //! [`solve_limbwise`], or [`WholeBody`] with or without elastic bands.
 
 mod chain;
+mod covariance;
 mod lengths;
 mod limbwise;
 mod schedule;
-mod spread;
 mod tree;
 mod warm_start;
 mod whole_body;
@@ -13,7 +13,6 @@ mod whole_body;
 pub(crate) use chain::ChainSolver;
 pub(crate) use limbwise::solve_limbwise;
 pub(crate) use schedule::Gate;
-pub(crate) use spread::Spread;
 pub(crate) use tree::TreeSolver;
 pub(crate) use warm_start::WarmStart;
 pub(crate) use whole_body::{LENGTH_INFORMATION, OVERLAP_SIGMA, SITE_SCALE, WholeBody};

@@ -34,7 +34,6 @@ const LIMBWISE_ROUNDS: usize = 3;
 /// Damped Gauss-Newton steps on the sites, and on the points where they are matched before the warm start.
 #[derive(Debug, Default)]
 pub(crate) struct WarmStart {
-    normal: NormalEquations,
     chain: ChainSolver,
     joint_sigmas: Vec<f64>,
     /// The poses with closed joints: before the frame, now, and after a step of all limbs.
@@ -103,7 +102,7 @@ impl WarmStart {
         let motions = body.limbs().iter().map(|part| part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion));
         refill(&mut self.joint_sigmas, motions.map(|motion| motion * time_scale));
         let root = [config.root_turn_sigma, config.root_shift_sigma].map(|sigma| sigma * time_scale);
-        self.normal.clear(poses.len());
+        self.chain.normal.clear(poses.len());
         // Where points are used, the weights are those before the reduction for bias: otherwise a site within its bias would
         // count fully.
         let with_points = !self.following.is_empty();
@@ -119,10 +118,10 @@ impl WarmStart {
             &Limits,
         ];
         for term in terms {
-            term.add(body, &self.closed, &mut self.normal);
+            term.add(body, &self.closed, &mut self.chain.normal);
         }
         self.moved.clone_from(&self.closed);
-        self.chain.step(body, &self.normal, 1.0, &mut self.moved);
+        self.chain.step(body, 1.0, &mut self.moved);
         for (limb, pose) in poses.iter_mut().enumerate() {
             let before = self.closed[limb];
             // Limbs that are not driven keep their poses.
@@ -144,10 +143,10 @@ impl WarmStart {
         let surface =
             |slide| Surface { correspondences, information, tangential_weight: slide, scale: config.kernel_start };
         // Following limbs may slide along their own axis.
-        surface(config.tangential_weight).add(body, &self.closed, &mut self.normal);
+        surface(config.tangential_weight).add(body, &self.closed, &mut self.chain.normal);
         self.held.clear(self.closed.len());
         surface(1.0).add(body, &self.closed, &mut self.held);
-        let blocks = self.normal.limbs.iter_mut().zip(&self.held.limbs);
+        let blocks = self.chain.normal.limbs.iter_mut().zip(&self.held.limbs);
         for ((block, held), _) in blocks.zip(&self.following).filter(|(_, follows)| !**follows) {
             *block = LimbBlock { h: held.h, ..LimbBlock::default() };
         }

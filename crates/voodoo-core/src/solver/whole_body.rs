@@ -2,11 +2,10 @@
 
 use super::schedule::narrowed;
 use super::{ChainSolver, Problem, TreeSolver};
-use crate::body::{JointKind, Model, Pair};
+use crate::body::{JointKind, Model};
 use crate::config::SolverKind;
 use crate::fit::Context;
 use crate::math::{Pose, Quat, Vec3, refill, reset};
-use crate::terms::normal_equations::NormalEquations;
 use crate::terms::{DetectedJoints, Floor, Limits, Measurements, Penetration, Posture, Prior, Rest, Term};
 
 /// Standard deviation of the depth of an axis inside another limb or below the ground, meters.
@@ -38,8 +37,7 @@ pub(crate) const SITE_SCALE: f64 = 0.15;
 /// Damped Gauss-Newton on robust terms.
 #[derive(Debug, Default)]
 pub(crate) struct WholeBody {
-    normal: NormalEquations,
-    chain: ChainSolver,
+    pub(crate) chain: ChainSolver,
     /// Solves for the limbs instead of the chain, with elastic bands at the joints.
     tree: TreeSolver,
     joint_sigmas: Vec<f64>,
@@ -66,28 +64,13 @@ impl WholeBody {
         let follows = problem.step + 1 < config.max_steps;
         let stride = if follows { 1.0 + self.points * OVER_RELAXATION } else { 1.0 };
         match config.solver {
-            SolverKind::Tree => self.tree.step(body, &self.normal, stride, config.band_sigma, poses),
-            _ => self.chain.step(body, &self.normal, stride, poses),
+            SolverKind::Tree => self.tree.step(body, &self.chain.normal, stride, config.band_sigma, poses),
+            _ => self.chain.step(body, stride, poses),
         }
     }
 
-    /// Writes the relative changes of the lengths of `pairs` that fit the correspondences at `poses` to `change`. On input,
-    /// `change` holds the change from each length to the one it is regularized to, with information `pull`. Returns false when
-    /// the lengths are not determined.
-    pub(crate) fn lengths(
-        &mut self,
-        problem: Problem,
-        poses: &[Pose],
-        pairs: &[Pair],
-        pull: &[f64],
-        change: &mut [f64],
-    ) -> bool {
-        self.sum_terms(problem, poses, false);
-        self.chain.lengths(&problem.context.model.body, &self.normal, poses, pairs, pull, change)
-    }
-
     /// Sums the normal equations at `poses`, with or without the sites that have a bias.
-    fn sum_terms(&mut self, problem: Problem, poses: &[Pose], biased: bool) {
+    pub(crate) fn sum_terms(&mut self, problem: Problem, poses: &[Pose], biased: bool) {
         self.weigh_sites(problem, poses.len(), biased);
         self.expect_motion(problem);
         let Problem { context, correspondences, predicted, step } = problem;
@@ -122,9 +105,9 @@ impl WholeBody {
             config.penetration.then_some(&penetration),
             floor.as_ref().filter(|_| config.penetration).map(|floor| floor as &dyn Term),
         ];
-        self.normal.clear(poses.len());
+        self.chain.normal.clear(poses.len());
         for term in terms.into_iter().flatten() {
-            term.add(body, poses, &mut self.normal);
+            term.add(body, poses, &mut self.chain.normal);
         }
     }
 

@@ -5,7 +5,6 @@ mod edits;
 pub(crate) mod estimate;
 pub(crate) mod expected;
 mod queries;
-mod report;
 
 use crate::body::{Body, Model};
 use crate::config::Config;
@@ -13,9 +12,9 @@ use crate::detect::{Detect, DetectError, Detected, PlacedDetection};
 use crate::error::TrackError;
 use crate::fit::{Fit, Motion, Setting};
 use crate::hypotheses::Hypotheses;
-use crate::math::{Pose, Vec3, is_rigid, refill};
+use crate::math::{Pose, Vec3, refill};
 use crate::observation::candidates::body_box;
-use crate::observation::frame::Frame;
+use crate::observation::frame::{Frame, check_poses};
 use crate::observation::observer::{Observer, Own};
 use crate::observation::ownership::OwnershipMask;
 use crate::relocalize::{DetectionVerdict, Reasons, Relocalizer, distance_cost, trunk_is_elsewhere};
@@ -111,14 +110,7 @@ impl BodyTracker {
 
     /// Sets the pose of every limb directly.
     pub(crate) fn reset_pose(&mut self, world_from_limb: &[Pose]) -> Result<&Estimate, TrackError> {
-        let count = self.model.body.limbs().len();
-        if world_from_limb.len() != count || !world_from_limb.iter().all(is_rigid) {
-            return Err(TrackError::measurement(
-                "world_from_limb",
-                "one rigid pose a limb",
-                format!("{} pose(s) for {count} limbs", world_from_limb.len()),
-            ));
-        }
+        check_poses(&self.model.body, world_from_limb)?;
         self.restart(self.model.body.clone(), world_from_limb.to_vec(), Start::SizesKnown);
         self.relocalizer.forget();
         Ok(&self.estimate)
@@ -156,13 +148,13 @@ impl BodyTracker {
     /// ones. Returns whether it could.
     fn restart_at_detection(&mut self) -> bool {
         let set = self.sizes.initial_body().unwrap_or(&self.model.body);
-        let Some(fitted) = self.relocalizer.fit_detected(&self.model, Some(set)) else { return false };
-        self.restart_fitted(fitted, self.sizes.known(), self.relocalizer.check.auto_initialized);
+        let Some((body, poses, _)) = self.relocalizer.fit_detected(&self.model, Some(set)) else { return false };
+        self.restart_fitted(body, poses, self.sizes.known(), self.relocalizer.check.auto_initialized);
         true
     }
 
     /// Restarts the track with the body and its poses that fit the current detection.
-    fn restart_fitted(&mut self, (body, poses): (Body, Vec<Pose>), sizes_known: bool, auto_initialized: bool) {
+    fn restart_fitted(&mut self, body: Body, poses: Vec<Pose>, sizes_known: bool, auto_initialized: bool) {
         self.restart(body, poses, if sizes_known { Start::SizesKnown } else { Start::Detected });
         self.relocalizer.record_start(auto_initialized);
         self.update_sizes();
@@ -190,10 +182,9 @@ impl BodyTracker {
         known: bool,
     ) -> bool {
         self.relocalizer.detection = Some(detection);
-        let known = known && self.relocalizer.detects_sizes_of(&self.model.body);
         let set = known.then_some(&self.model.body);
-        let Some(fitted) = self.relocalizer.fit_detected(&self.model, set) else { return false };
-        self.restart_fitted(fitted, known, true);
+        let Some((body, poses, known)) = self.relocalizer.fit_detected(&self.model, set) else { return false };
+        self.restart_fitted(body, poses, known, true);
         std::mem::swap(&mut self.before, &mut self.estimate);
         self.assessor.moved();
         self.track(frame, ownership);
@@ -204,8 +195,7 @@ impl BodyTracker {
     /// is there.
     pub(crate) fn start_at_positions(&mut self, frame: &Frame, ownership: OwnershipMask, fit_sizes: bool) -> bool {
         let positions: Vec<(usize, Vec3)> = frame.positions.iter().map(|of| (of.site, of.position)).collect();
-        let count = self.model.body.sites().len();
-        let started = positions.iter().all(|(site, _)| *site < count) && self.reset(&positions, fit_sizes).is_ok();
+        let started = self.reset(&positions, fit_sizes).is_ok();
         if started {
             self.step(frame, ownership);
         }

@@ -9,7 +9,7 @@ use crate::body::kinematics::freedoms;
 use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Model};
 use crate::math::{Vec3, factor, refill, reset};
-use crate::solver::{SITE_SCALE, Spread};
+use crate::solver::{ChainSolver, SITE_SCALE};
 use crate::terms::{Regions, Sites, Term};
 
 /// Standard deviation of every unknown of a pose that the user set, radians and meters.
@@ -22,7 +22,7 @@ const MIN_WEIGHT: f64 = 1e-3;
 /// Estimate of the uncertainty of a pose, updated from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct EdgeFilter {
-    spread: Spread,
+    chain: ChainSolver,
     /// Information of all unknowns after the last frame, lower triangle.
     known: Vec<f64>,
     /// Inverse variance of each unknown's motion since the last frame, and working memory.
@@ -55,19 +55,19 @@ impl EdgeFilter {
         let FittedPose { model: Model { body, .. }, poses, .. } = found;
         self.expect(body, found.time_scale);
         self.sum_terms(found);
-        let Self { spread, known, sigma, .. } = self;
+        let Self { chain, known, sigma, .. } = self;
         sigma.clear();
         let add = |h: &mut [f64]| {
             known.iter_mut().zip(&*h).for_each(|(known, added)| *known += added);
             h.copy_from_slice(known);
         };
-        if !spread.factor(body, poses, add) {
+        if !chain.factor(body, poses, add) {
             know_alone(known, self.still.len(), MAX_SIGMA);
             return;
         }
         for (limb, part) in body.limbs().iter().enumerate() {
             let end = poses[limb] * (part.shape.length() * Vec3::Z);
-            let end = spread.of_limb(limb, end);
+            let end = chain.of_limb(limb, end);
             sigma.push((3..6).map(|axis| end[(axis, axis)]).sum::<f64>().sqrt());
         }
     }
@@ -113,9 +113,9 @@ impl EdgeFilter {
     /// Adds the frame's information on every limb, weighted by how strongly the limb is supported.
     fn sum_terms(&mut self, found: FittedPose) {
         let FittedPose { model: Model { body, extremities, .. }, poses, correspondences, config, .. } = found;
-        let normal = &mut self.spread.normal;
+        let normal = &mut self.chain.normal;
         normal.clear(poses.len());
-        Regions { pairs: &correspondences.regions, colors: None }.add(body, poses, normal);
+        Regions { pairs: &correspondences.regions }.add(body, poses, normal);
         for (limb, block) in normal.limbs.iter_mut().enumerate() {
             let support_net =
                 correspondences.region_support.get(limb).map_or(0.0, |support| support.own - support.against);

@@ -18,7 +18,7 @@ use crate::body::{Model, Pair};
 use crate::config::Config;
 use crate::math::{Pose, Vec3};
 use crate::sizes::girth::ALIKE;
-use crate::solver::{LENGTH_INFORMATION, SITE_SCALE, Spread};
+use crate::solver::{ChainSolver, LENGTH_INFORMATION, SITE_SCALE};
 use crate::terms::{Measurements, Term};
 
 /// Maximum number of surface points per meter of limb with independent errors.
@@ -37,7 +37,7 @@ const SITE_SIGMA: [f64; 2] = [0.01, 0.015];
 /// Estimate of the uncertainty of a pose, updated from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct Uncertainty {
-    spread: Spread,
+    chain: ChainSolver,
     /// Variance of every unknown after the last frame.
     variance: Vec<f64>,
     information: Vec<f64>,
@@ -80,31 +80,29 @@ impl Uncertainty {
     ) {
         self.expect(found);
         self.sum_terms(found, proven);
-        let Self { spread, variance, information, known } = self;
+        let Self { chain, variance, information, known } = self;
         let body = &found.model.body;
         covariances.forget(body);
         let step = information.len() + 1;
         let add = |h: &mut [f64]| h.iter_mut().step_by(step).zip(&*information).for_each(|(value, own)| *value += own);
-        if !spread.factor(body, found.poses, add) {
+        if !chain.factor(body, found.poses, add) {
             return;
         }
         variance.clear();
         for (limb, part) in body.limbs().iter().enumerate() {
-            let own = spread.of_joint(limb);
+            let own = chain.of_joint(limb);
             variance.extend((0..freedoms(part)).map(|index| own[(index, index)]));
-            let axes = part
-                .parent
-                .as_ref()
-                .map_or([Vec3::X, Vec3::Y, Vec3::Z], |(parent, joint)| joint_axes(joint, &found.poses[*parent]).0);
+            let parent = part.parent.as_ref();
+            let axes = parent.map_or(Vec3::AXES, |(parent, joint)| joint_axes(joint, &found.poses[*parent]).0);
             covariances.set_turn(limb, &own, axes);
-            let covariance = spread.of_limb(limb, found.poses[limb].translation);
+            let covariance = chain.of_limb(limb, found.poses[limb].translation);
             covariances.set_limb(limb, &covariance, SITE_SIGMA[usize::from(found.sizes_found)]);
         }
         for (index, site) in body.sites().iter().enumerate() {
             covariances.set_site(index, site.limb, found.poses[site.limb].rotation * site.position);
         }
         known.resize(found.pairs.len(), LENGTH_INFORMATION[1]);
-        let lengths = spread.system.length_information(body, found.poses, found.pairs);
+        let lengths = chain.length_information(body, found.poses, found.pairs);
         for ((pair, known), information) in found.pairs.iter().zip(known).zip(lengths) {
             // Errors of successive frames are correlated.
             *known += information / ALIKE;
@@ -139,7 +137,7 @@ impl Uncertainty {
     /// Returns the frame's information on every limb, limited to the number of independent measurements.
     fn sum_terms(&mut self, found: FittedPose, proven: impl Fn(usize) -> bool) {
         let FittedPose { model: Model { body, .. }, poses, correspondences, config, .. } = found;
-        let normal = &mut self.spread.normal;
+        let normal = &mut self.chain.normal;
         normal.clear(poses.len());
         let scales = [config.kernel_end, SITE_SCALE];
         Measurements { correspondences, config, scales, biased: true }.add(body, poses, normal);
@@ -171,7 +169,7 @@ mod tests {
         let pairs = model.body.pairs();
         with_context(&before_wall(&model.body, &poses), &config, &model, &poses, |context| {
             let mut fit = Fit::new(&config).unwrap();
-            fit.match_last(context, &poses);
+            fit.match_last(context, &poses, true);
             let mut uncertainty = Uncertainty::default();
             let mut covariances = Covariances::default();
             (0..frames)

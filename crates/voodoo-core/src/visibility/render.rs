@@ -11,8 +11,8 @@ use rayon::prelude::*;
 use crate::body::Body;
 use crate::camera::Camera;
 use crate::error::TrackError;
-use crate::math::{LANES, Pose, Vec3, is_rigid, refill, reset, vectorized};
-use crate::observation::frame::check_pose;
+use crate::math::{LANES, Pose, Vec3, refill, reset, vectorized};
+use crate::observation::frame::{check_pose, check_poses};
 use crate::shape::TaperedEllipticCylinder;
 
 /// Value of a pixel that shows no limb.
@@ -113,10 +113,7 @@ impl Rendering {
         pool: Option<&rayon::ThreadPool>,
     ) -> Result<(), TrackError> {
         check_pose("world_from_sensor", &view.world_from_sensor)?;
-        let [poses, limbs] = [world_from_limb.len(), body.limbs().len()];
-        let found = format_args!("{poses} poses for {limbs} limbs, or one not finite");
-        let valid = poses == limbs && world_from_limb.iter().all(is_rigid);
-        TrackError::unless(valid, "world_from_limb", "one rigid pose a limb", found)?;
+        check_poses(body, world_from_limb)?;
         let Self { width, depth, limb, raycasters } = self;
         *width = view.camera.width();
         reset(depth, view.camera.pixels(), 0.0);

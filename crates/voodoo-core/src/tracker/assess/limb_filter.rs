@@ -32,28 +32,17 @@ pub(super) struct LimbFilter {
     /// Fraction of them that are unoccluded.
     pub(super) visible: f64,
     /// Displacement of the distal end in the last frame, and its difference to the displacement in the frame before, meters.
-    motion: Vec3,
+    pub(super) motion: Vec3,
     pub(super) unexpected: f64,
 }
 
 impl LimbFilter {
-    /// Updates with the displacement of the distal end since the last frame, meters.
-    pub(super) fn moved(&mut self, motion: Vec3) {
-        self.unexpected = motion.distance(self.motion);
-        self.motion = motion;
-    }
-
     /// Updates both odds with the log odds from this frame's measurements for the limb and for its distal end, and with those
     /// from a detection. `unexpected` is the unexpected part of the motion, meters.
     pub(super) fn observe(&mut self, evidence: [f64; 2], detected: f64, unexpected: f64) {
         for (log_odds, evidence) in self.log_odds.iter_mut().zip(evidence) {
             *log_odds = updated(*log_odds, evidence, detected, unexpected);
         }
-    }
-
-    /// Whether the cameras see where the limb is.
-    pub(super) fn is_visible(&self) -> bool {
-        self.visible >= LITTLE
     }
 
     /// Returns the status of a limb with these log odds: it is measured where measurements support it, and lost where it should be

@@ -133,7 +133,7 @@ impl Assessor {
                 log_odds[*end] = limbs[chain.lower].log_odds[1];
             }
         }
-        self.status = overall(internal, |limb| limbs[limb].is_visible());
+        self.status = overall(internal, |limb| limbs[limb].visible >= LITTLE);
         if square > 0.0 {
             let [products, squares] = self.round.map(|sum| ROUNDNESS_MEMORY * sum);
             self.round = [products + product, squares + square];
@@ -205,8 +205,10 @@ impl Assessor {
             filter.evidence = support_log_odds(now[0]);
             let far_end =
                 |poses: &[Pose]| poses.get(limb).map(|pose| *pose * (body.limbs()[limb].shape.length() * Vec3::Z));
-            filter
-                .moved(far_end(poses).zip(far_end(context.previous)).map_or(Vec3::ZERO, |(now, before)| now - before));
+            let ends = far_end(poses).zip(far_end(context.previous));
+            let motion = ends.map_or(Vec3::ZERO, |(now, before)| now - before);
+            filter.unexpected = motion.distance(filter.motion);
+            filter.motion = motion;
         }
         round
     }
@@ -308,7 +310,7 @@ mod tests {
         let (model, config) = (standing().0, without_background());
         with_context(pixels, &config, &model, poses, |context| {
             let mut fit = Fit::new(&config).unwrap();
-            fit.match_last(context, poses);
+            fit.match_last(context, poses, true);
             (0..frames).for_each(|_| assessor.assess(context, &fit.correspondences, poses, None));
         });
     }
