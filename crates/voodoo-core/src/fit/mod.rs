@@ -10,7 +10,7 @@ pub(crate) use motion::{Motion, UNKNOWN_MOTION};
 use crate::association::assignment::{Assignment, match_limb};
 use crate::association::buried::Buried;
 use crate::association::contour::Contours;
-use crate::association::correspondence::{Correspondences, DetectedPair, LimbMatches};
+use crate::association::correspondence::{Correspondences, LimbMatches};
 use crate::association::visible_side::match_visible_side;
 use crate::body::{Body, Pair};
 use crate::config::Config;
@@ -38,8 +38,7 @@ pub(crate) struct Fit {
     pub(crate) contours: Contours,
     /// The colors of limbs and surroundings.
     pub(crate) regions: regions::ColorRegions,
-    /// Joints that a detector found in this frame, and where it found the limbs.
-    detected: Vec<DetectedPair>,
+    /// Where a detector found the limbs in this frame.
     detected_limbs: DetectedLimbs,
     /// Variance of each limb's radius, square meters.
     radius_variances: Vec<f64>,
@@ -58,7 +57,7 @@ impl Fit {
         self.forget_detected();
         if let Some(detected) = detected {
             detected.locate(body, origin, &mut self.detected_limbs);
-            detected.measure(body, poses, origin, &mut self.detected);
+            detected.measure(body, poses, origin, &mut self.correspondences.detected);
         }
     }
 
@@ -69,13 +68,15 @@ impl Fit {
 
     /// Forgets the detection: poses are compared by what the sensors measure.
     pub(crate) fn forget_detected(&mut self) {
-        self.detected.clear();
+        self.correspondences.detected.clear();
         self.detected_limbs.clear();
     }
 
-    /// Exchanges the last correspondences, so that another pose can be tried in between.
+    /// Exchanges the last correspondences, so that another pose can be tried in between. The joints that were detected in this frame
+    /// stay.
     pub(crate) fn swap_matches(&mut self, matched: &mut Correspondences) {
         std::mem::swap(&mut self.correspondences, matched);
+        std::mem::swap(&mut self.correspondences.detected, &mut matched.detected);
     }
 
     /// Clears the correspondences.
@@ -207,7 +208,6 @@ impl Fit {
     fn match_sites(&mut self, context: Context, poses: &[Pose]) {
         let (frame, origin) = (context.observation.frame(), context.observation.origin());
         self.correspondences.add_sites(&context.model.body, poses, frame, origin);
-        self.correspondences.detected.clone_from(&self.detected);
     }
 
     fn assign(&mut self, context: Context, poses: &[Pose], gate: &Gate) {

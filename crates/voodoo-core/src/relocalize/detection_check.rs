@@ -85,6 +85,8 @@ pub(crate) struct DetectionCheck {
     since: Option<f64>,
     /// Stamp of the last detection that counted, seconds.
     last_detection: Option<f64>,
+    /// Log odds that the object at the queried position is a person; the largest over all images of this frame.
+    pub(super) person_odds: Option<f64>,
     /// Whether the detection of this frame counts against the track's being a person: those of following frames are alike.
     counts: bool,
     /// Whether a detection agreed with the track, or one elsewhere was of somebody else.
@@ -137,8 +139,8 @@ impl DetectionCheck {
     }
 
     /// Updates with the log odds that the object at the tracked position is a person. Returns whether it is none.
-    pub(super) fn is_false_track(&mut self, person_odds: Option<f64>) -> bool {
-        if let Some(person) = person_odds.filter(|_| self.counts) {
+    pub(crate) fn is_false_track(&mut self) -> bool {
+        if let Some(person) = self.person_odds.filter(|_| self.counts) {
             self.false_track = (self.false_track - person.clamp(-ENOUGH_ODDS, ENOUGH_ODDS)).max(0.0);
         }
         self.false_track >= FALSE_TRACK_ODDS
@@ -208,7 +210,10 @@ mod tests {
     fn a_track_that_is_no_person_ends_and_one_that_is_mostly_a_person_does_not() {
         let ends = |odds: &[f64]| {
             let mut check = DetectionCheck { counts: true, ..DetectionCheck::default() };
-            odds.iter().any(|person| check.is_false_track(Some(*person)))
+            odds.iter().any(|person| {
+                check.person_odds = Some(*person);
+                check.is_false_track()
+            })
         };
         assert!(ends(&[-4.0; 4]) && !ends(&[-4.0, 4.0].repeat(20)));
     }

@@ -21,8 +21,7 @@ use crate::observation::ownership::OwnershipMask;
 use crate::observation::segments::Segments;
 use crate::tracker::estimate::Status;
 use detection_check::{DetectionCheck, ELSEWHERE, SIGMAS};
-pub(crate) use detection_check::{DetectionVerdict, Reasons};
-pub(crate) use detection_check::{ENOUGH_ODDS, distance_cost, trunk_is_elsewhere};
+pub(crate) use detection_check::{DetectionVerdict, ENOUGH_ODDS, Reasons, distance_cost, trunk_is_elsewhere};
 use trials::{Trials, try_at};
 
 /// Number of consecutive frames after which a lost body counts as lost.
@@ -37,8 +36,6 @@ pub(crate) struct Relocalizer {
     pub(crate) detection: Option<PlacedDetection>,
     /// Number of the image with the detection.
     image: usize,
-    /// Log odds that the object at the queried position is a person; the largest over all images.
-    person_odds: Option<f64>,
     /// The floor that the detector found under an auto-initialized body, world frame. It is used where the ground plane is not
     /// given.
     pub(crate) floor: Option<Ground>,
@@ -48,8 +45,8 @@ pub(crate) struct Relocalizer {
     candidates: Candidates,
     matched: Correspondences,
     trials: Trials,
-    /// The poses of the last trial, working frame.
-    found: Vec<Pose>,
+    /// The poses that a detection or the search found last, working frame.
+    pub(crate) found: Vec<Pose>,
     segments: Segments,
     /// The last tracked poses, or those that were set, and these turned.
     tracked: Vec<Pose>,
@@ -84,11 +81,6 @@ impl Relocalizer {
         Some(check.compare(detected, body, poses, origin))
     }
 
-    /// Whether the track is not a person, by the detections up to this frame.
-    pub(crate) fn is_false_track(&mut self) -> bool {
-        self.check.is_false_track(self.person_odds)
-    }
-
     /// Returns whether the detected poses of this frame, refined, explain the frame better than the present ones; working frame.
     /// The matches of `fit` are restored before it returns.
     pub(crate) fn try_detected(&mut self, context: Context, fit: &mut Fit, present: &[Pose], lost: bool) -> bool {
@@ -119,11 +111,6 @@ impl Relocalizer {
         better
     }
 
-    /// The poses that a detection or the search found last, working frame.
-    pub(crate) fn found(&self) -> &[Pose] {
-        &self.found
-    }
-
     /// Whether the lost body is searched for: from the frame on from which a loss is not just a blurred image.
     pub(crate) fn is_searching(&self) -> bool {
         self.lost >= PATIENCE
@@ -144,7 +131,7 @@ impl Relocalizer {
 
     /// Drops the detection of this frame.
     pub(crate) fn forget(&mut self) {
-        (self.detection, self.person_odds) = (None, None);
+        (self.detection, self.check.person_odds) = (None, None);
     }
 
     /// Returns the detection of this frame, if there is one.
@@ -195,7 +182,7 @@ impl Relocalizer {
             if let (DetectionQuery::Near(place), Some((person, bounds))) = (query, self.detector.nearest())
                 && bounds.contains(place)
             {
-                self.person_odds = Some(self.person_odds.map_or(person, |before| before.max(person)));
+                self.check.person_odds = Some(self.check.person_odds.map_or(person, |before| before.max(person)));
             }
         }
     }
@@ -236,7 +223,7 @@ mod tests {
             }
             relocalizer.observe(Status::Lost, false, &present);
             let found = relocalizer.search(context, &mut fit, &present);
-            let mut found = found.then(|| relocalizer.found().to_vec());
+            let mut found = found.then(|| relocalizer.found.clone());
             assert_eq!(format!("{:?}", fit.correspondences), before);
             // Two more frames with the same image.
             for _ in 0..2 {

@@ -37,6 +37,7 @@ pub(crate) const SITE_SCALE: f64 = 0.15;
 /// Damped Gauss-Newton on robust terms.
 #[derive(Debug, Default)]
 pub(crate) struct WholeBody {
+    /// The normal equations, and what solves them with exact joints.
     pub(crate) chain: ChainSolver,
     /// Solves for the limbs instead of the chain, with elastic bands at the joints.
     tree: TreeSolver,

@@ -6,7 +6,7 @@
 use super::{PATCH, Term};
 use crate::association::correspondence::{Correspondences, LimbMatches};
 use crate::body::Body;
-use crate::math::{LANES, Mat3, Pose, vectorized};
+use crate::math::{LANES, Mat3, Pose, load, vectorized};
 use crate::terms::normal_equations::{LimbBlock, NormalEquations};
 use crate::visibility::EXPLAINED;
 
@@ -91,9 +91,8 @@ impl Surface<'_> {
         if count * LANES < matches.weight.len() {
             // Empty lanes have weight zero.
             let last = columns.map(|column| {
-                let rest = &column[count * LANES..];
                 let mut lanes = [0.0; LANES];
-                lanes[..rest.len()].copy_from_slice(rest);
+                load(&mut lanes, &column[count * LANES..]);
                 lanes
             });
             self.sum_block(last, &mut sums);

@@ -10,7 +10,7 @@ use crate::body::{Body, Model};
 use crate::config::Config;
 use crate::detect::{Detect, DetectError, Detected, PlacedDetection};
 use crate::error::TrackError;
-use crate::fit::{Fit, Motion, Setting};
+use crate::fit::{Context, Fit, Motion, Setting};
 use crate::hypotheses::Hypotheses;
 use crate::math::{Pose, Vec3, refill};
 use crate::observation::candidates::body_box;
@@ -329,7 +329,7 @@ impl BodyTracker {
         motion.commit(frame.stamp);
         self.relocalizer.observe(self.assessor.status, self.observer.silent(frame), &self.motion.poses);
         self.report(frame.stamp, steps, Some(time_scale));
-        if self.relocalizer.is_false_track() {
+        if self.relocalizer.check.is_false_track() {
             self.stop(frame.stamp);
         }
     }
@@ -355,10 +355,10 @@ impl BodyTracker {
         observer.release(frame, ownership, relocalizer.own_pixels());
         let observation = observer.observation(frame, motion.origin, ownership);
         let previous = if motion.stamp.is_some() { &motion.poses[..] } else { &[] };
-        let setting = Setting { config, observation, previous, time_scale: 1.0 };
+        let context = Context { config, model, observation, previous, time_scale: 1.0 };
         let lost = assessor.status == Status::Lost;
         fit.forget_detected();
-        let is_there = relocalizer.try_detected(setting.with_model(model), fit, &motion.predicted, lost);
+        let is_there = relocalizer.try_detected(context, fit, &motion.predicted, lost);
         if is_there {
             let Own { image, pixels } = relocalizer.own_pixels();
             self.moved_to = Some((image, pixels.to_vec()));
@@ -374,8 +374,8 @@ impl BodyTracker {
         }
         observer.begin(frame, ownership);
         let observation = observer.observation(frame, motion.origin, ownership);
-        let setting = Setting { config, observation, previous: &[], time_scale: 1.0 };
-        if relocalizer.search(setting.with_model(model), fit, &motion.predicted) {
+        let context = Context { config, model, observation, previous: &[], time_scale: 1.0 };
+        if relocalizer.search(context, fit, &motion.predicted) {
             self.move_to_found(frame, ownership);
             self.assessor.moved();
         }
@@ -385,7 +385,7 @@ impl BodyTracker {
     fn move_to_found(&mut self, frame: &Frame, ownership: OwnershipMask) -> bool {
         let Motion { poses, predicted, .. } = &mut self.motion;
         predicted.clone_from(poses);
-        poses.clone_from_slice(self.relocalizer.found());
+        poses.clone_from_slice(&self.relocalizer.found);
         self.reassess(frame, ownership);
         if self.assessor.status != Status::Lost {
             self.motion.forget();
@@ -404,10 +404,10 @@ impl BodyTracker {
         let Self { config, model, motion: Motion { poses, previous, origin, .. }, observer, fit, assessor, .. } = self;
         let bounds = body_box(&model.body, poses, config.body_box_margin);
         let observation = observer.gather(frame, *origin, &bounds, ownership, config);
-        let setting = Setting { config, observation, previous, time_scale: 1.0 };
-        fit.match_all(setting.with_model(model), poses, config.max_steps, true);
+        let context = Context { config, model, observation, previous, time_scale: 1.0 };
+        fit.match_all(context, poses, config.max_steps, true);
         assessor.moved();
-        assessor.assess(setting.with_model(model), &fit.correspondences, poses, None);
+        assessor.assess(context, &fit.correspondences, poses, None);
     }
 
     /// Index of the image and pixels of the detection to which the body was moved in this frame: they show no scene.
