@@ -87,10 +87,18 @@ impl Hypotheses {
                 fit.regions.draw(context.posed(poses), is_other);
             }
             self.propose(Extremity::new(context, fit, poses, chain), detection);
-            let (taken, better) = self.try_proposals(context, fit, poses, predicted);
-            steps += taken;
-            if better {
-                self.unexplained.collect(context.observation.candidates, &fit.correspondences);
+            let Self { proposals, refined, unexplained, .. } = self;
+            if proposals.iter().all(Vec::is_empty) {
+                continue;
+            }
+            let mut current = refined.cost(context, fit, poses);
+            for proposal in proposals.iter().filter(|poses| !poses.is_empty()) {
+                let (taken, better) = refined.replace(context, fit, poses, predicted, current, proposal);
+                steps += taken;
+                if better {
+                    current = refined.cost(context, fit, poses);
+                    unexplained.collect(context.observation.candidates, &fit.correspondences);
+                }
             }
         }
         if by_colors {
@@ -154,30 +162,6 @@ impl Hypotheses {
         if let Some(detection) = detection {
             propose_detected_end(at, detection, rough, detected);
         }
-    }
-
-    /// Refines the proposals and accepts those that explain the frame better. Returns the number of ICP steps, and whether the pose
-    /// has changed.
-    fn try_proposals(
-        &mut self,
-        context: Context,
-        fit: &mut Fit,
-        poses: &mut Vec<Pose>,
-        predicted: &mut Vec<Pose>,
-    ) -> (usize, bool) {
-        if self.proposals.iter().all(Vec::is_empty) {
-            return (0, false);
-        }
-        let (mut steps, mut improved, mut current) = (0, false, self.refined.cost(context, fit, poses));
-        for proposal in self.proposals.iter().filter(|poses| !poses.is_empty()) {
-            let (taken, better) = self.refined.replace(context, fit, poses, predicted, current, proposal);
-            steps += taken;
-            if better {
-                improved = true;
-                current = self.refined.cost(context, fit, poses);
-            }
-        }
-        (steps, improved)
     }
 }
 
