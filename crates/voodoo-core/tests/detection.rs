@@ -79,7 +79,7 @@ fn farthest(tracker: &Tracker, body: &Body, poses: &[Pose]) -> f64 {
 fn feed(tracker: &mut Tracker, pixels: &[u16], frames: std::ops::Range<i32>) {
     let images = [CAMERA.image(pixels)];
     for frame in frames {
-        tracker.step(&Frame::empty(f64::from(frame) / 30.0).with_images(&images)).unwrap();
+        tracker.step(&Frame { images: &images, ..Frame::empty(f64::from(frame) / 30.0) }).unwrap();
     }
 }
 
@@ -198,7 +198,7 @@ fn a_detector_that_fails_leaves_the_step_as_it_would_be_without_detections_and_r
         let mut bits = Vec::new();
         let mut errors = Vec::new();
         for frame in 0..4 {
-            tracker.step(&Frame::empty(f64::from(frame)).with_images(&images)).unwrap();
+            tracker.step(&Frame { images: &images, ..Frame::empty(f64::from(frame)) }).unwrap();
             bits.push(scene::bits(tracker.estimate()));
             errors.push(tracker.detector_error().map(ToString::to_string));
         }
@@ -257,7 +257,7 @@ fn several_persons_are_found_by_any_detector_and_without_one_who_is_added_is_fol
     let images = [CAMERA.image(&pixels)];
     let step = |people: &mut People, frames: i32| {
         for frame in 0..frames {
-            people.step(&Frame::empty(f64::from(frame) / 15.0).with_images(&images), &[]).unwrap();
+            people.step(&Frame { images: &images, ..Frame::empty(f64::from(frame) / 15.0) }, &[]).unwrap();
         }
     };
     let roots = |people: &People| -> Vec<Vec3> {

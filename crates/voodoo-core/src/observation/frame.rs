@@ -71,7 +71,7 @@ pub enum Scope {
 ///     scope: Scope::Limb(body.limb_index("l_hand")?),
 ///     source: 0,
 /// };
-/// Frame::empty(0.0).with_clouds(&[cloud]).check(&body, None)?;
+/// Frame { clouds: &[cloud], ..Frame::empty(0.0) }.check(&body, None)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
@@ -212,7 +212,7 @@ pub struct PositionRelation {
 /// let (site, world_from_sensor) = (body.site_index("l_wrist")?, Pose::IDENTITY);
 /// let (origin, direction) = (world_from_sensor.translation, world_from_sensor.rotation * Vec3::new(x, y, 1.0));
 /// let ray = RayRelation { site, origin, direction, weight: 8.0, bias: 0.0, source: 0 };
-/// Frame::empty(0.0).with_rays(&[ray]).check(&body, None)?;
+/// Frame { rays: &[ray], ..Frame::empty(0.0) }.check(&body, None)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -249,7 +249,7 @@ pub struct RayRelation {
 /// let positions: Vec<PositionRelation> = (0..body.sites().len()).map(measured).collect();
 /// let person = DetectedPerson { positions: &positions, person: f64::INFINITY };
 /// let mut tracker = Tracker::new(body, Config::default())?;
-/// let estimate = tracker.step(&Frame::empty(0.0).with_detections(&[person]))?;
+/// let estimate = tracker.step(&Frame { detections: &[person], ..Frame::empty(0.0) })?;
 /// assert!(estimate.world_from_limb[0].translation.distance(standing[0].translation) < 0.01);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -293,7 +293,7 @@ impl Ground {
 
 /// All measurements of one instant.
 ///
-/// [`Frame::empty`] makes one without measurements; add them with the `with_` methods, or set the fields.
+/// [`Frame::empty`] makes one without measurements, for the fields that are not given.
 ///
 /// ```
 /// use voodoo_core::math::Vec3;
@@ -302,15 +302,13 @@ impl Ground {
 /// let body = Body::human(1.75, HumanModel::Measured)?;
 /// let site = body.site_index("l_wrist")?;
 /// let wrist = PositionRelation { site, position: Vec3::new(0.1, 0.2, 1.5), weight: 20.0, bias: 0.0, source: 0 };
-/// let frame = Frame::empty(0.0)
-///     .with_positions(std::slice::from_ref(&wrist))
-///     .with_ground(Ground { normal: Vec3::Z, offset: 0.0 });
+/// let ground = Some(Ground { normal: Vec3::Z, offset: 0.0 });
+/// let frame = Frame { positions: &[wrist], ground, ..Frame::empty(0.0) };
 /// frame.check(&body, None)?;
 /// assert!(frame.check(&body, Some(1.0)).is_err()); // not after the previous frame
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
-#[non_exhaustive]
 pub struct Frame<'a> {
     /// Seconds.
     pub stamp: f64,
@@ -332,45 +330,11 @@ pub struct Frame<'a> {
     pub excluded: &'a [Aabb],
 }
 
-/// Functions that return a frame with another part.
-macro_rules! with_parts {
-    ($($(#[$doc:meta])* $with:ident($part:ident: $type:ty);)*) => {$(
-        $(#[$doc])*
-        #[must_use]
-        pub fn $with(self, $part: $type) -> Self {
-            Self { $part, ..self }
-        }
-    )*};
-}
-
-impl<'a> Frame<'a> {
+impl Frame<'_> {
     /// A frame without measurements.
     pub fn empty(stamp: f64) -> Self {
-        let (positions, rays, detections) = Default::default();
-        Self { stamp, clouds: &[], images: &[], colors: &[], positions, rays, detections, ground: None, excluded: &[] }
-    }
-
-    with_parts! {
-        /// The frame with these 3-D points.
-        with_clouds(clouds: &'a [Cloud<'a>]);
-        /// The frame with these depth images.
-        with_images(images: &'a [DepthImage<'a>]);
-        /// The frame with these color images.
-        with_colors(colors: &'a [ColorImage<'a>]);
-        /// The frame with these site positions.
-        with_positions(positions: &'a [PositionRelation]);
-        /// The frame with these site rays.
-        with_rays(rays: &'a [RayRelation]);
-        /// The frame with these detected persons.
-        with_detections(detections: &'a [DetectedPerson<'a>]);
-        /// The frame with these boxes of the world whose points belong to no person.
-        with_excluded(excluded: &'a [Aabb]);
-    }
-
-    /// The frame with this ground plane, or without one.
-    #[must_use]
-    pub fn with_ground(self, ground: impl Into<Option<Ground>>) -> Self {
-        Self { ground: ground.into(), ..self }
+        let (clouds, images, colors, positions, rays, detections, excluded) = Default::default();
+        Self { stamp, clouds, images, colors, positions, rays, detections, ground: None, excluded }
     }
 
     /// Returns an error for unusable input, before any of it reaches the tracker's state.

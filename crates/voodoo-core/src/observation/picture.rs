@@ -63,7 +63,7 @@ impl ColorPixels<'_> {
 ///     number: 0,
 ///     source: 0,
 /// };
-/// Frame::empty(0.0).with_colors(&[image]).check(&Body::human(1.75, HumanModel::Measured)?, None)?;
+/// Frame { colors: &[image], ..Frame::empty(0.0) }.check(&Body::human(1.75, HumanModel::Measured)?, None)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug)]

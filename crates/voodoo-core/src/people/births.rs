@@ -332,8 +332,8 @@ impl People {
         let placed = PlacedDetection { index: 0, root: track.place, detection: track.detection.clone() };
         let depth_frame = &Frame { colors: &[], ..*frame };
         let came = if !track.positions.is_empty() {
-            let frame = depth_frame.with_positions(&track.positions);
-            person.tracker.start_at_positions(&frame, ownership, !known)
+            let frame = &Frame { positions: &track.positions, ..*depth_frame };
+            person.tracker.start_at_positions(frame, ownership, !known)
         } else if person.present {
             person.tracker.recover(depth_frame, ownership, placed)
         } else {

@@ -29,7 +29,7 @@ const AWAY: f64 = 1.0;
 /// tracker.reset_pose(&standing)?;
 /// for stamp in [0.00, 0.03, 0.06] {
 ///     let wrist = PositionRelation { site, position: marker, weight: 20.0, bias: 0.0, source: 0 };
-///     tracker.step(&Frame::empty(stamp).with_positions(&[wrist]))?;
+///     tracker.step(&Frame { positions: &[wrist], ..Frame::empty(stamp) })?;
 /// }
 /// assert!(tracker.estimate().sites[site].distance(marker) < 0.01);
 /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -123,7 +123,7 @@ pub(crate) struct Posed<'a> {
 /// for stamp in [0.0, 0.03] {
 ///     let pixels = ColorPixels::Color(&red_on_gray);
 ///     let image = ColorImage { pixels, camera: &camera, world_from_sensor, stamp, number: 0, source: 0 };
-///     tracker.step(&Frame::empty(stamp).with_colors(&[image]))?;
+///     tracker.step(&Frame { colors: &[image], ..Frame::empty(stamp) })?;
 /// }
 /// let near = tracker.region_lines(0).filter(|line| line.sigma.is_finite() && line.offset.abs() < 3.0); // pixels
 /// assert!(near.count() > 50);

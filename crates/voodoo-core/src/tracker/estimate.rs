@@ -100,7 +100,7 @@ pub struct SourceReport {
 ///     PositionRelation { site, position, weight: 20.0, bias: 0.0, source: 0 }
 /// };
 /// let markers: Vec<_> = (0..body.sites().len()).map(marker).collect();
-/// let estimate = tracker.step(&Frame::empty(0.0).with_positions(&markers))?;
+/// let estimate = tracker.step(&Frame { positions: &markers, ..Frame::empty(0.0) })?;
 ///
 /// assert_eq!(estimate.status, Status::Tracking);
 /// assert_eq!(estimate.limb_status[body.limb_index("l_forearm")?], LimbStatus::Measured);
