@@ -4,8 +4,7 @@ use super::labels::{LimbLabels, NOTHING};
 use crate::body::Body;
 use crate::camera::{Camera, NEAREST_RETURN};
 use crate::math::{Pose, Vec3};
-use crate::observation::depth_view::{DepthView, Pixel};
-use crate::observation::frame::Frame;
+use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::picture::ColorImage;
 
 /// Points on the rim of a free end.
@@ -47,31 +46,6 @@ const SAME_VIEW: f64 = 0.15;
 /// A measurement nearer than a limb by more than this occludes it, meters: the limbs may not have converged yet.
 const BEFORE_BY: f64 = 0.15;
 
-/// A depth camera beside a color camera: it measures what occludes the body.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct OcclusionDepth<'a> {
-    view: DepthView<'a>,
-    depth_from_camera: Pose,
-}
-
-impl<'a> OcclusionDepth<'a> {
-    /// The depth camera beside the camera of an image, if the frame has one.
-    pub(super) fn new(frame: &Frame<'a>, picture: &ColorImage) -> Option<Self> {
-        let place = picture.world_from_sensor.translation;
-        let near = |pose: &Pose| pose.translation.distance(place) < SAME_VIEW;
-        let image = frame.images.iter().find(|image| near(&image.world_from_sensor))?;
-        let working_from_camera = image.world_from_sensor;
-        let view = DepthView { image, background: &[], working_from_camera, segmented: false };
-        Some(Self { view, depth_from_camera: working_from_camera.inverse() * picture.world_from_sensor })
-    }
-
-    /// Whether something occludes a point in the camera frame.
-    fn is_occluded(&self, point: Vec3) -> bool {
-        let point = self.depth_from_camera * point;
-        matches!(self.view.at(point), Pixel::Foreground(depth) if depth < point.z - BEFORE_BY)
-    }
-}
-
 /// Data for placing the lines of a limb.
 pub(super) struct Viewer<'a> {
     pub body: &'a Body,
@@ -79,7 +53,15 @@ pub(super) struct Viewer<'a> {
     pub labels: &'a LimbLabels,
     /// Pixels per unit.
     pub unit: f32,
-    pub beside: Option<OcclusionDepth<'a>>,
+    pub world_from_camera: Pose,
+    /// The image of a depth camera beside the camera, if the frame has one: it measures what occludes the body.
+    pub depth: Option<&'a DepthImage<'a>>,
+}
+
+/// The image of the depth camera beside the camera of a picture, if the frame has one.
+pub(super) fn depth_beside<'a>(frame: &Frame<'a>, picture: &ColorImage) -> Option<&'a DepthImage<'a>> {
+    let place = picture.world_from_sensor.translation;
+    frame.images.iter().find(|image| image.world_from_sensor.translation.distance(place) < SAME_VIEW)
 }
 
 impl Viewer<'_> {
@@ -140,7 +122,8 @@ impl Viewer<'_> {
         let place = self.camera.project(point)?.map(|value| value as f32);
         let (normal, motion) = (n.map(|value| value as f32), self.camera.gradient(point, n)?);
         let (outside, depth, clear) = self.border(limb, place, normal)?;
-        let hidden = self.beside.is_some_and(|beside| beside.is_occluded(point));
+        let measured = self.depth.and_then(|depth| depth.measured(self.world_from_camera * point));
+        let hidden = measured.is_some_and(|[depth, expected]| depth > 0.0 && depth < expected - BEFORE_BY);
         Some(Line {
             limb: limb as u16,
             foot,

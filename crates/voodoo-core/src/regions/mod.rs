@@ -26,7 +26,7 @@ use empty_scene::EmptyScene;
 use evidence::Evidence;
 use histogram::Kind;
 use labels::LimbLabels;
-use lines::{Line, OcclusionDepth, Viewer};
+use lines::{Line, Viewer, depth_beside};
 use models::ColorModel;
 use pixel_gain::camera_from_limb_at;
 use scan::{EdgeSearch, ScanView};
@@ -306,8 +306,9 @@ impl ColorRegions {
         lines.clear();
         // Reserves the full capacity at once: the number of lines differs from pose to pose.
         lines.reserve(2 * MOST_LINES * camera_from_limb.len());
-        let beside = OcclusionDepth::new(posed.frame, picture);
-        let viewer = Viewer { body, camera: picture.camera, labels, unit: *unit, beside };
+        let (camera, world_from_camera) = (picture.camera, picture.world_from_sensor);
+        let depth = depth_beside(posed.frame, picture);
+        let viewer = Viewer { body, camera, labels, unit: *unit, world_from_camera, depth };
         for (limb, pose) in camera_from_limb.iter().enumerate() {
             let lines_a_side = (body.limbs()[limb].shape.length() / SPACING).round() as usize;
             viewer.add(limb, pose, lines_a_side.clamp(LEAST_LINES, MOST_LINES), lines);
