@@ -16,8 +16,6 @@ pub(crate) struct Assignment {
     search: NearestLimb,
     /// The nearest limb of each candidate.
     nearest: Vec<u32>,
-    /// For each candidate, which limbs' boxes contain it; only filled when the overlap policy needs it.
-    inside: Vec<bool>,
 }
 
 impl Assignment {
@@ -31,7 +29,7 @@ impl Assignment {
         box_margin: f64,
         buried: &[bool],
     ) {
-        let Self { members, search, nearest, inside } = self;
+        let Self { members, search, nearest } = self;
         // One more list for the candidates outside all boxes.
         members.resize_with(poses.len() + 1, Vec::new);
         for limb in members.iter_mut() {
@@ -40,9 +38,8 @@ impl Assignment {
             limb.reserve(candidates.len());
         }
         nearest.resize(candidates.len(), NONE);
-        inside.resize(if overlap == Overlap::Exclusive { 0 } else { candidates.len() * poses.len() }, false);
         search.place(body, poses, box_margin, buried);
-        search.find(&candidates.clusters, nearest, inside);
+        search.find(&candidates.clusters, nearest);
         if overlap == Overlap::Exclusive {
             let count = candidates.len();
             let (nearest, known) = (&nearest[..count], &candidates.limb[..count]);
@@ -63,11 +60,10 @@ impl Assignment {
         }
         for (index, (nearest, known)) in (0..).zip(nearest.iter().zip(&candidates.limb)) {
             match *known {
-                ANY_LIMB if *nearest == NONE => {}
                 ANY_LIMB => {
-                    let inside = &inside[index as usize * poses.len()..][..poses.len()];
-                    for (limb, _) in inside.iter().enumerate().filter(|(_, inside)| **inside) {
-                        let nearest = *nearest as usize;
+                    let (place, nearest) = (index as usize, *nearest as usize);
+                    let Points { x, y, z } = &candidates.points;
+                    for limb in search.around([x[place], y[place], z[place]]) {
                         if overlap == Overlap::Shared || limb == nearest || body.adjacent(limb, nearest) {
                             members[limb].push(index);
                         }

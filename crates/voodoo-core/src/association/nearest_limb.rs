@@ -45,15 +45,12 @@ impl NearestLimb {
     }
 
     /// Writes the nearest limb of every point, or [`NONE`], to `nearest`.
-    ///
-    /// If `inside` has room, it gets for every point and limb whether the limb's box contains the point; otherwise pass it
-    /// empty.
-    pub(crate) fn find(&mut self, clusters: &Clusters, nearest: &mut [u32], inside: &mut [bool]) {
+    pub(crate) fn find(&mut self, clusters: &Clusters, nearest: &mut [u32]) {
         self.least.resize(self.groups.len(), [OUTSIDE; LANES]);
         self.expected.resize(clusters.iter().len(), [0; 2]);
         vectorized!({
             for (index, cluster) in clusters.iter().enumerate() {
-                let found = self.find_cluster(index, &cluster, inside);
+                let found = self.find_cluster(index, &cluster);
                 for (which, limb) in cluster.which.iter().zip(found) {
                     nearest[*which as usize] = limb;
                 }
@@ -61,8 +58,13 @@ impl NearestLimb {
         });
     }
 
+    /// The limbs whose boxes contain a point.
+    pub(crate) fn around(&self, [x, y, z]: [f32; 3]) -> impl Iterator<Item = usize> {
+        self.limbs.iter().enumerate().filter(move |(_, limb)| limb.holds(limb.local(x, y, z))).map(|(index, _)| index)
+    }
+
     #[inline(always)]
-    fn find_cluster(&mut self, index: usize, cluster: &Cluster, inside: &mut [bool]) -> [u32; CLUSTER] {
+    fn find_cluster(&mut self, index: usize, cluster: &Cluster) -> [u32; CLUSTER] {
         let Self { limbs, groups, least, expected } = self;
         for (least, group) in least.iter_mut().zip(groups) {
             *least = group.least_squares(cluster.bounds);
@@ -71,31 +73,21 @@ impl NearestLimb {
         // The distances to the expected limbs decide which others must be evaluated. After a reset there may be fewer limbs.
         let [first, second] = expected[index].map(|limb| (limb as usize).min(limbs.len() - 1));
         best.offer(first as u32, &limbs[first].squares(cluster));
-        if inside.is_empty() {
-            if second != first {
-                best.offer(second as u32, &limbs[second].squares(cluster));
+        if second != first {
+            best.offer(second as u32, &limbs[second].squares(cluster));
+        }
+        for (start, least) in (0..).step_by(LANES).zip(least.iter()) {
+            let mut remaining = within(least, best.worst());
+            for limb in [first, second] {
+                remaining &= !(1_u32.checked_shl((limb as u32).wrapping_sub(start)).unwrap_or(0));
             }
-            for (start, least) in (0..).step_by(LANES).zip(least.iter()) {
-                let mut remaining = within(least, best.worst());
-                for limb in [first, second] {
-                    remaining &= !(1_u32.checked_shl((limb as u32).wrapping_sub(start)).unwrap_or(0));
-                }
-                while remaining != 0 {
-                    let limb = start + remaining.trailing_zeros();
-                    best.offer(limb, &limbs[limb as usize].squares(cluster));
-                    remaining &= remaining - 1;
-                    if remaining != 0 {
-                        // The bound may now exclude some of the remaining limbs.
-                        remaining &= within(least, best.worst());
-                    }
-                }
-            }
-        } else {
-            for (limb, shape) in limbs.iter().enumerate() {
-                let squares = shape.squares(cluster);
-                best.offer(limb as u32, &squares);
-                for (which, square) in cluster.which.iter().zip(squares) {
-                    inside[*which as usize * limbs.len() + limb] = square < OUTSIDE;
+            while remaining != 0 {
+                let limb = start + remaining.trailing_zeros();
+                best.offer(limb, &limbs[limb as usize].squares(cluster));
+                remaining &= remaining - 1;
+                if remaining != 0 {
+                    // The bound may now exclude some of the remaining limbs.
+                    remaining &= within(least, best.worst());
                 }
             }
         }
@@ -317,14 +309,11 @@ mod tests {
             let poses = body.rest_pose(Pose::new(Vec3::ZERO, Vec3::new(0.1, 0.2, 0.3) * seed as f64));
             let points = around(seed);
             clusters.arrange(&points);
-            let (mut quick, mut thorough) = (vec![NONE; points.len()], vec![NONE; points.len()]);
+            let mut nearest = vec![NONE; points.len()];
             search.place(&body, &poses, margin, &[]);
-            search.find(&clusters, &mut quick, &mut []);
-            let mut inside = vec![false; points.len() * poses.len()];
-            search.find(&clusters, &mut thorough, &mut inside);
-            assert_eq!(quick, thorough);
+            search.find(&clusters, &mut nearest);
             let mut found = 0;
-            for (index, nearest) in quick.iter().enumerate() {
+            for (index, nearest) in nearest.iter().enumerate() {
                 let squares = search.limbs.iter().map(|limb| {
                     let local = limb.local(points.x[index], points.y[index], points.z[index]);
                     if limb.holds(local) { limb.square(local) } else { OUTSIDE }
@@ -334,9 +323,8 @@ mod tests {
                 let first = squares.iter().position(|square| *square == least && least < OUTSIDE);
                 assert_eq!(first.map_or(NONE, |limb| limb as u32), *nearest);
                 found += usize::from(first.is_some());
-                for (limb, square) in squares.iter().enumerate() {
-                    assert_eq!(inside[index * poses.len() + limb], *square < OUTSIDE);
-                }
+                let around = search.around([points.x[index], points.y[index], points.z[index]]);
+                assert!(around.eq((0..squares.len()).filter(|limb| squares[*limb] < OUTSIDE)));
             }
             assert!(found > 400, "{found}");
         }
