@@ -21,9 +21,12 @@ pub(crate) struct PlacedDetection {
 #[derive(Debug, Default)]
 pub(crate) struct BoundDetector {
     detector: Option<Box<dyn Detect>>,
-    map: JointMap,
-    knows: bool,
-    error: Option<DetectError>,
+    /// The mapping of its joints and lengths to the body.
+    pub map: JointMap,
+    /// Whether a detector is set and can find the body.
+    pub knows: bool,
+    /// The last error since this was cleared.
+    pub error: Option<DetectError>,
 }
 
 impl BoundDetector {
@@ -41,29 +44,9 @@ impl BoundDetector {
         self.knows = detector.is_some_and(|detector| detector.knows(body));
     }
 
-    /// Whether a detector is set and can find the body.
-    pub(crate) fn knows(&self) -> bool {
-        self.knows
-    }
-
-    /// The mapping of its joints and lengths to the body.
-    pub(crate) fn map(&self) -> &JointMap {
-        &self.map
-    }
-
     /// Another detector of the same kind with no state from images.
     pub(crate) fn fresh(&self) -> Option<Box<dyn Detect>> {
         self.detector.as_ref().map(|detector| detector.fresh())
-    }
-
-    /// The last error since [`Self::clear_error`].
-    pub(crate) fn error(&self) -> Option<&DetectError> {
-        self.error.as_ref()
-    }
-
-    /// Clears the last error.
-    pub(crate) fn clear_error(&mut self) {
-        self.error = None;
     }
 
     /// Returns the persons that the detector reports in an image; for [`DetectionQuery::Near`] only the nearest. Returns none

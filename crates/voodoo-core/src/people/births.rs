@@ -28,7 +28,7 @@ impl People {
             let place = fitted.ok().and_then(|(_, poses)| poses.first().map(|root| root.translation));
             if let Some(place) = place.filter(|place| self.is_requested(frame, *place)) {
                 self.tentative.update(TentativeTrack::given(frame.stamp, place, detection), None);
-                if self.detector.knows() && self.finds_new(frame.stamp) {
+                if self.detector.knows && self.finds_new(frame.stamp) {
                     self.detect(frame, DetectionQuery::Near(place));
                 }
             }
@@ -84,7 +84,7 @@ impl People {
         };
         if everybody_there
             || !self.finds_new(frame.stamp)
-            || !self.detector.knows()
+            || !self.detector.knows
             || self.last_detection.is_some_and(|last| frame.stamp - last < wait)
         {
             return;
@@ -120,7 +120,7 @@ impl People {
             let mut newcomers = Vec::new();
             for next in 0..MOST_TOGETHER {
                 let Some(one) = found.get(next) else { break };
-                let detected = Detected { detection: &one.detection, map: self.detector.map() };
+                let detected = Detected { detection: &one.detection, map: &self.detector.map };
                 newcomers.extend(fit_body(&self.prototype, detected));
                 // Newcomers are numbered after all persons.
                 let (image, pixels) = (&frame.images[number], &one.detection.pixels);
@@ -267,7 +267,7 @@ impl People {
 
     /// Returns the detection of a tentative track.
     fn detected<'a>(&'a self, track: &'a TentativeTrack) -> Detected<'a> {
-        Detected { detection: &track.detection, map: self.detector.map() }
+        Detected { detection: &track.detection, map: &self.detector.map }
     }
 
     /// Returns the body of a tentative track, in its sizes, and its poses.
@@ -328,7 +328,7 @@ impl People {
         }
         let known = person.created < frame.stamp;
         let ownership = self.assignment.ownership(own, &self.scene.known);
-        let detected = Detected { detection: &track.detection, map: self.detector.map() };
+        let detected = Detected { detection: &track.detection, map: &self.detector.map };
         let placed = PlacedDetection { index: 0, root: track.place, detection: track.detection.clone() };
         let depth_frame = &Frame { colors: &[], ..*frame };
         let came = if !track.positions.is_empty() {

@@ -102,7 +102,7 @@ impl People {
 
     /// The error of a detector in the last step, if one failed: that of the shared detector, else that of a person's.
     pub fn detector_error(&self) -> Option<&DetectError> {
-        self.detector.error().or_else(|| self.persons.iter().find_map(|person| person.tracker.detector_error()))
+        self.detector.error.as_ref().or_else(|| self.persons.iter().find_map(|person| person.tracker.detector_error()))
     }
 
     /// Why somebody who was detected in the last step is not tracked; `None` if nobody was, or everybody is.
@@ -179,7 +179,7 @@ impl People {
     fn advance(&mut self, frame: &Frame, own: &[(usize, Frame)]) {
         self.stamp = Some(frame.stamp);
         self.refusal = None;
-        self.detector.clear_error();
+        self.detector.error = None;
         if self.config.background {
             self.scene.register(frame);
         }

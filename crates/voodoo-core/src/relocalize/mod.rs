@@ -76,7 +76,7 @@ impl Relocalizer {
     /// Compares the detection of this frame with a body at these poses, working frame, whose origin is at `origin` in the world.
     pub(crate) fn compare(&mut self, body: &Body, poses: &[Pose], origin: Vec3) -> Option<DetectionVerdict> {
         let Self { detector, detection, check, .. } = self;
-        let detected = Detected { detection: &detection.as_ref()?.detection, map: detector.map() };
+        let detected = Detected { detection: &detection.as_ref()?.detection, map: &detector.map };
         Some(check.compare(detected, body, poses, origin))
     }
 
@@ -141,7 +141,7 @@ impl Relocalizer {
     /// `present`. The matches of `fit` are restored before it returns.
     pub(crate) fn search(&mut self, context: Context, fit: &mut Fit, present: &[Pose]) -> bool {
         let views = context.observation.views;
-        if !self.is_searching() || self.detector.knows() && !views.frame.images.is_empty() {
+        if !self.is_searching() || self.detector.knows && !views.frame.images.is_empty() {
             return false;
         }
         self.search.segments.find(views, context.config);

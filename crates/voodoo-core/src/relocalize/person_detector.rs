@@ -18,7 +18,7 @@ impl Relocalizer {
 
     /// Returns the detection of this frame, if there is one.
     pub(crate) fn detected(&self) -> Option<Detected<'_>> {
-        self.detection.as_ref().map(|detection| Detected { detection: &detection.detection, map: self.detector.map() })
+        self.detection.as_ref().map(|detection| Detected { detection: &detection.detection, map: &self.detector.map })
     }
 
     /// Returns the pixels of the detection.
@@ -43,7 +43,7 @@ impl Relocalizer {
         reasons: Reasons,
     ) {
         self.forget();
-        if !self.check.is_due(frame.stamp, reasons, ownership.others) || !self.detector.knows() {
+        if !self.check.is_due(frame.stamp, reasons, ownership.others) || !self.detector.knows {
             return;
         }
         let query = if reasons.anywhere { DetectionQuery::Any } else { DetectionQuery::Near(root) };

@@ -91,12 +91,12 @@ impl BodyTracker {
 
     /// Whether the tracker searches for the body while it has no pose: it has a detector that supports this body.
     pub fn can_search(&self) -> bool {
-        self.relocalizer.detector.knows()
+        self.relocalizer.detector.knows
     }
 
     /// The error of the detector in the last step, if it failed. The step then ran without detections.
     pub(crate) fn detector_error(&self) -> Option<&DetectError> {
-        self.relocalizer.detector.error()
+        self.relocalizer.detector.error.as_ref()
     }
 
     /// Sets the pose, and with `fit_sizes` the sizes, from positions of named sites (index of the site, world position). Sizes
@@ -139,7 +139,7 @@ impl BodyTracker {
     /// Updates the pose with the pixels and points of a frame, which the caller has checked, that show this body or nobody (K06
     /// IV-B). A body without a pose stays without.
     pub(crate) fn step(&mut self, frame: &Frame, ownership: OwnershipMask) {
-        self.relocalizer.detector.clear_error();
+        self.relocalizer.detector.error = None;
         self.moved_to = None;
         if self.is_started() {
             self.before.keep(&self.estimate);
@@ -155,9 +155,9 @@ impl BodyTracker {
     /// Restarts the track at the current detection, in the sizes that were set or, where they clearly differ, in the detected
     /// ones. Returns whether it could.
     fn restart_at_detection(&mut self) -> bool {
-        let set = self.sizes.initial_body().unwrap_or(&self.model.body);
+        let set = self.sizes.set.as_ref().unwrap_or(&self.model.body);
         let Some(fitted) = self.relocalizer.fit_detected(&self.model, Some(set)) else { return false };
-        self.restart_fitted(fitted, self.sizes.known(), self.relocalizer.check.auto_initialized);
+        self.restart_fitted(fitted, self.sizes.set.is_none(), self.relocalizer.check.auto_initialized);
         true
     }
 
@@ -247,7 +247,7 @@ impl BodyTracker {
         }
         let origin = motion.origin;
         let root = origin + motion.expect(&model.body, frame.stamp, config.prediction)[0].translation;
-        let suspect = hypotheses.has_excess() || sizes.is_uncertain(relocalizer.detector.map());
+        let suspect = hypotheses.has_excess() || sizes.is_uncertain(&relocalizer.detector.map);
         let reasons = Reasons {
             uncertain: suspect || assessor.is_uncertain(&model.extremities),
             anywhere: interrupted,
@@ -326,7 +326,7 @@ impl BodyTracker {
         }
         // Refinement of the sizes with this frame.
         let lost = assessor.status == Status::Lost;
-        sizes.refine_lengths(setting, model, poses, predicted, fit, relocalizer.detector.map(), lost);
+        sizes.refine_lengths(setting, model, poses, predicted, fit, &relocalizer.detector.map, lost);
         if whole_body {
             sizes.refine_girths(setting, model, poses, fit, |limb| assessor.is_reliable(limb));
         }
@@ -439,7 +439,7 @@ impl BodyTracker {
             return;
         };
         let (body, poses, correspondences) = (&model.body, &motion.poses, &fit.correspondences);
-        let (pairs, sizes_found) = (sizes.refined_pairs(), sizes.found_with_pose());
+        let (pairs, sizes_found) = (sizes.pairs.as_slice(), sizes.rough);
         let found = FittedPose { model, poses, correspondences, pairs, sizes_found, time_scale, config };
         let branch_distance = |limb: usize| {
             let length = body.limbs()[limb].shape.length();
