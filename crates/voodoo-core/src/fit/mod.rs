@@ -352,7 +352,7 @@ mod tests {
                 fit.match_points(context, poses, &Gate { distance, ..GATE });
                 assert!(fit.correspondences.sites.is_empty() && fit.correspondences.contour.is_empty());
                 let limbs = fit.correspondences.limbs.iter();
-                limbs.map(|limb| limb.accepted().0).sum::<usize>() as f64 / context.observation.candidates.len() as f64
+                limbs.map(|limb| limb.accepted()).sum::<usize>() as f64 / context.observation.candidates.len() as f64
             };
             assert!(matched(0.1, &poses) > 0.95);
             let deeper = moved(&poses, 0.06 * Vec3::Z);

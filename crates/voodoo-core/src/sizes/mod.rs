@@ -16,6 +16,7 @@ use girth::{
     ASIDE_SIGMA, FOUND_SHARE, GIRTH_STEPS, Girth, GirthPrior, TIP_FACTORS, first_system, follow_girth, side_system,
     start_girth,
 };
+pub(crate) use reported::LengthEstimate;
 use reported::ReportedLengths;
 
 /// Points farther than this from the given pose are not used for the sizes, meters.

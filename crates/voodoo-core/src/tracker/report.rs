@@ -29,8 +29,8 @@ impl Estimate {
         estimate.joint_gaps.clear();
         for (index, limb) in body.limbs().iter().enumerate() {
             let matches = correspondences.limbs.get(index);
-            let (count, sum) = matches.map_or((0, 0.0), |matches| matches.accepted());
-            let weight = matches.map_or(0.0, |matches| matches.total_weight());
+            let count = matches.map_or(0, |matches| matches.accepted());
+            let (weight, sum) = matches.map_or((0.0, 0.0), |matches| matches.weighed());
             estimate.limb_points.push(count);
             estimate.limb_residual.push((sum / weight).sqrt());
             estimate.joint_gaps.push(limb.parent.as_ref().map_or(0.0, |(parent, joint)| {
