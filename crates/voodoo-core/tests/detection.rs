@@ -228,7 +228,7 @@ fn what_cannot_be_meant_is_a_failure_that_names_it() {
         }),
         ("detection[0].lengths: expected 0", |observed| observed.lengths = vec![[1.0, 0.1]]),
         ("detection[0].person and facing", |observed| observed.person = f64::NAN),
-        ("detection[0].low and high", |observed| observed.high = Vec3::INFINITY),
+        ("detection[0].bounds", |observed| observed.bounds.maxs = Vec3::INFINITY),
         ("detection[0].pixels: expected indices below 19840", |observed| observed.pixels = vec![usize::MAX]),
     ];
     for (words, wrong) in wrongs {

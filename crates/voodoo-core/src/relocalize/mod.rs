@@ -93,7 +93,8 @@ impl Relocalizer {
         let Some(mut place) = fit_pose(&context.model.body, detected) else { return false };
         place.iter_mut().for_each(|pose| *pose = shifted(pose, origin));
         let margin = context.config.body_box_margin;
-        let there = Aabb::new(detected.detection.low - origin, detected.detection.high - origin).enlarged(margin);
+        let Aabb { mins, maxs } = detected.detection.bounds;
+        let there = Aabb::new(mins - origin, maxs - origin).enlarged(margin);
         // Points that the present pose explains must not be left unexplained, unless the body is `lost` there.
         let here = if lost { there } else { body_box(&context.model.body, present, margin) };
         let bounds = there.union(here);
