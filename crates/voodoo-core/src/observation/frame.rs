@@ -350,8 +350,8 @@ impl Frame<'_> {
             check_weight(format_args!("points[{index}].weight"), cloud.weight)?;
             check_pose(format_args!("points[{index}].world_from_sensor"), &cloud.world_from_sensor)?;
             if let Scope::Limb(limb) = cloud.scope {
-                let what = format_args!("points[{index}].limb");
-                check_index(what, "the index of a limb", limb, body.limbs().len())?;
+                let (what, valid) = (format_args!("points[{index}].limb"), limb < body.limbs().len());
+                TrackError::unless(valid, what, "the index of a limb", limb)?;
             }
             if let Some(row) = (0..cloud.points.len()).find(|row| !is_place(cloud.points.get(*row))) {
                 let found = format!("{:?} in row {row}", cloud.points.get(row).to_array());
@@ -359,7 +359,12 @@ impl Frame<'_> {
             }
         }
         for (index, image) in self.images.iter().enumerate() {
-            check_image(index, image)?;
+            let (what, unit) = (format_args!("depth[{index}]"), image.meters_per_unit);
+            check_size(format_args!("{what}.image"), image.pixels.len(), image.camera)?;
+            let valid = unit > 0.0 && unit.is_finite();
+            TrackError::unless(valid, format_args!("{what}.meters_per_unit"), "a finite length above zero", unit)?;
+            check_weight(format_args!("{what}.weight"), image.weight)?;
+            check_pose(format_args!("{what}.world_from_sensor"), &image.world_from_sensor)?;
         }
         for (index, picture) in self.colors.iter().enumerate() {
             picture.check(index, self.stamp, &self.colors[..index])?;
@@ -383,11 +388,6 @@ impl Frame<'_> {
             let (what, found) = (format_args!("{what}.direction"), format_args!("{found:?}"));
             TrackError::unless(known, what, "a vector that is not zero", found)?;
         }
-        self.check_scene()
-    }
-
-    /// Rejects invalid ground planes and boxes.
-    fn check_scene(&self) -> Result<(), TrackError> {
         if let Some(Ground { normal, offset }) = self.ground {
             let valid = offset.is_finite() && normal.is_normalized();
             let found = format_args!("normal {:?} and offset {offset}", normal.to_array());
@@ -402,15 +402,6 @@ impl Frame<'_> {
     }
 }
 
-fn check_image(index: usize, image: &DepthImage) -> Result<(), TrackError> {
-    let (what, unit) = (format_args!("depth[{index}]"), image.meters_per_unit);
-    check_size(format_args!("{what}.image"), image.pixels.len(), image.camera)?;
-    let valid = unit > 0.0 && unit.is_finite();
-    TrackError::unless(valid, format_args!("{what}.meters_per_unit"), "a finite length above zero", unit)?;
-    check_weight(format_args!("{what}.weight"), image.weight)?;
-    check_pose(format_args!("{what}.world_from_sensor"), &image.world_from_sensor)
-}
-
 /// Rejects an image that has not a value for every pixel of its camera.
 pub(super) fn check_size(what: impl Display, pixels: usize, camera: &Camera) -> Result<(), TrackError> {
     let found = format_args!("{pixels} for {}x{}", camera.width(), camera.height());
@@ -423,14 +414,11 @@ fn check_position(what: impl Display, relation: &PositionRelation, body: &Body) 
 }
 
 fn check_relation(what: impl Display, site: usize, weight: f64, bias: f64, body: &Body) -> Result<(), TrackError> {
-    check_index(format_args!("{what}.site"), "the index of a site", site, body.sites().len())?;
+    let valid = site < body.sites().len();
+    TrackError::unless(valid, format_args!("{what}.site"), "the index of a site", site)?;
     check_weight(format_args!("{what}.weight"), weight)?;
     let valid = bias.is_finite() && bias >= 0.0;
     TrackError::unless(valid, format_args!("{what}.bias"), "a finite length, zero or above", bias)
-}
-
-fn check_index(what: impl Display, expected: &'static str, index: usize, count: usize) -> Result<(), TrackError> {
-    TrackError::unless(index < count, what, expected, index)
 }
 
 fn check_weight(what: impl Display, weight: f64) -> Result<(), TrackError> {

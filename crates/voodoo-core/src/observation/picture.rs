@@ -21,16 +21,11 @@ pub enum ColorPixels<'a> {
 
 impl ColorPixels<'_> {
     /// Number of pixels.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         match self {
             Self::Color(pixels) => pixels.len(),
             Self::Gray(pixels) => pixels.len(),
         }
-    }
-
-    /// True when there is no pixel.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// The color of a pixel.
