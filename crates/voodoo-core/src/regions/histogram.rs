@@ -41,18 +41,14 @@ impl Kind {
     }
 }
 
-/// The bin of a color.
-#[inline(always)]
-pub(super) fn color_bin(pixel: [u8; 3]) -> usize {
-    let [x, y, z] = pixel.map(|value| usize::from(value >> (8 - BITS)));
-    (x * SIDE + y) * SIDE + z
-}
-
 /// The bin of a pixel.
 #[inline(always)]
 pub(super) fn bin_of(pixels: &ColorPixels, index: usize) -> usize {
     match pixels {
-        ColorPixels::Color(pixels) => color_bin(pixels[index]),
+        ColorPixels::Color(pixels) => {
+            let [x, y, z] = pixels[index].map(|value| usize::from(value >> (8 - BITS)));
+            (x * SIDE + y) * SIDE + z
+        }
         ColorPixels::Gray(pixels) => usize::from(pixels[index]),
     }
 }

@@ -244,7 +244,7 @@ impl ColorRegions {
                     let length = posed.body.limbs()[limb].shape.length();
                     evidence[limb].take(line.foot.z / length, found.map(|found| found.beside));
                 }
-                let Some(edge) = found.map(|found| found.edge).filter(|edge| edge.information > 0.0) else { continue };
+                let Some(edge) = found.filter(|edge| edge.information > 0.0) else { continue };
                 let motion = line.motion / f64::from(unit);
                 let slope = motion.length();
                 pairs.push(RegionPair {
@@ -266,13 +266,13 @@ impl ColorRegions {
         camera.into_iter().flat_map(|camera| {
             let unit = camera.unit;
             camera.lines.iter().zip(&camera.edges).map(move |(line, found)| {
-                let edge = found.map(|found| found.edge).unwrap_or_default();
+                let [mean, information] = found.map_or([0.0; 2], |edge| [edge.mean, edge.information]);
                 RegionLine {
                     limb: usize::from(line.limb),
                     place: line.place,
                     normal: line.normal,
-                    offset: unit * edge.mean,
-                    sigma: unit / edge.information.sqrt(),
+                    offset: unit * mean,
+                    sigma: unit / information.sqrt(),
                 }
             })
         })

@@ -1,11 +1,11 @@
 //! Samples images along lines: log ratios of limb and surroundings, and colors to learn.
 
 use super::empty_scene::EmptyScene;
-use super::histogram::{bin_of, clamped, color_bin};
+use super::histogram::{bin_of, clamped};
 use super::labels::{LimbLabels, NOTHING};
 use super::lines::{BESIDE, Line, NEARER_BY};
 use super::models::ColorModel;
-use super::posterior::{ColorEdge, MOST_REACH, edge};
+use super::posterior::{MOST_REACH, edge};
 use crate::camera::Camera;
 use crate::observation::picture::{ColorImage, ColorPixels};
 
@@ -45,7 +45,9 @@ pub(super) struct ScanView<'a> {
 /// Result of the search on a line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LineEdge {
-    pub edge: ColorEdge,
+    /// Position, units outward from the expected edge, and its information.
+    pub mean: f32,
+    pub information: f32,
     /// Mean log ratios inside and outside of the contour.
     pub beside: [f32; 2],
 }
@@ -53,7 +55,9 @@ pub(super) struct LineEdge {
 /// Finds the edge on a line; `None` where there is no evidence.
 pub(super) fn edge_on(view: &ScanView, line: &Line, search: EdgeSearch, together: bool) -> Option<LineEdge> {
     let group = view.group(line.limb);
-    if !line.clear || !view.model.knows(group) || view.outside_is(line, group) {
+    // A neighbor outside of the contour may have the same colors as the limb.
+    let alike = line.outside != NOTHING && view.group(line.outside) == group;
+    if !line.clear || !view.model.knows(group) || alike {
         return None;
     }
     let EdgeSearch { reach, every } = search;
@@ -65,29 +69,17 @@ pub(super) fn edge_on(view: &ScanView, line: &Line, search: EdgeSearch, together
     let mut ratios = [0.0; 4 * MOST_REACH];
     let ratios = &mut ratios[..far + span];
     if far == width {
-        fill_ratios(view, line, [start - far as f32, every], ratios);
+        view.fill(line, [start - far as f32, every], ratios);
     } else {
-        fill_ratios(view, line, [start - width as f32, every], &mut ratios[..far]);
-        fill_ratios(view, line, [start, every], &mut ratios[far..]);
+        view.fill(line, [start - width as f32, every], &mut ratios[..far]);
+        view.fill(line, [start, every], &mut ratios[far..]);
     }
     let (inside, outside) = ratios.split_at(far + reach);
     let mean = |ratios: &[f32]| ratios.iter().sum::<f32>() / ratios.len() as f32;
     let next = NEXT_TO.min(reach);
     let beside = [mean(&inside[inside.len() - next..]), mean(&outside[..next])];
-    let found = edge(&ratios[far..], (width > 0).then(|| &ratios[..span]), reach, every);
-    let edge = ColorEdge { mean: every * found.mean, information: found.information / (every * every) };
-    Some(LineEdge { edge, beside })
-}
-
-/// Fills `ratios` with log ratios at samples outward, `every` units apart, the first at `start` samples.
-fn fill_ratios(view: &ScanView, line: &Line, [start, every]: [f32; 2], ratios: &mut [f32]) {
-    match view.picture.pixels {
-        ColorPixels::Color(pixels) => view.fill(line, [start, every], ratios, |pixel| color_bin(pixels[pixel])),
-        ColorPixels::Gray(pixels) => {
-            view.fill(line, [start, every], ratios, |pixel| usize::from(pixels[pixel]));
-            compare_locally(view, line, [start, every], ratios);
-        }
-    }
+    let [mean, information] = edge(&ratios[far..], (width > 0).then(|| &ratios[..span]), reach, every);
+    Some(LineEdge { mean, information, beside })
 }
 
 /// Distribution of brightness beside the contour: a Gaussian (R07).
@@ -147,16 +139,9 @@ impl ScanView<'_> {
         usize::from(self.groups[usize::from(limb)])
     }
 
-    /// Whether the neighbor outside the contour has the same colors as the limb.
-    fn outside_is(&self, line: &Line, group: usize) -> bool {
-        line.outside != NOTHING && self.group(line.outside) == group
-    }
-
-    /// Fills `ratios` with log ratios at samples outward, the first at `start` samples; `bin` returns the bin of a pixel.
-    #[inline(always)]
-    fn fill(&self, line: &Line, [start, every]: [f32; 2], ratios: &mut [f32], bin: impl Fn(usize) -> usize) {
-        let (model, group) = (self.model, self.group(line.limb));
-        let known = model.ratios(group);
+    /// Fills `ratios` with log ratios at samples outward, `every` units apart, the first at `start` samples.
+    fn fill(&self, line: &Line, [start, every]: [f32; 2], ratios: &mut [f32]) {
+        let group = self.group(line.limb);
         let mut r = start * every;
         let walk = Walk::new(self.picture, line, r * self.unit, every * self.unit);
         for (ratio, pixel) in ratios.iter_mut().zip(walk) {
@@ -165,14 +150,12 @@ impl ScanView<'_> {
                 && let Some(other) = self.other(line, r, column, row)
             {
                 let pixel = row * self.picture.camera.width() + column;
-                let bin = bin(pixel);
-                *ratio = if other == NOTHING && self.scene.is_none() {
-                    known[bin]
-                } else {
-                    self.ratio(group, other, pixel, bin)
-                };
+                *ratio = self.ratio(group, other, pixel, bin_of(&self.picture.pixels, pixel));
             }
             r += every;
+        }
+        if let ColorPixels::Gray(_) = self.picture.pixels {
+            compare_locally(self, line, [start, every], ratios);
         }
     }
 
