@@ -76,7 +76,7 @@ pub(crate) fn with_frame<R>(pixels: &[u16], stamp: f64, check: impl FnOnce(&Fram
 
 /// A mask of a scene in which nobody else is.
 pub(crate) fn everything(scene: &Backgrounds) -> OwnershipMask<'_> {
-    OwnershipMask { owners: &[], cloud_owners: &[], own: 0, others: 0, scene }
+    OwnershipMask { owners: &[], own: 0, others: 0, scene }
 }
 
 /// The scene of a frame in which the wall is known.

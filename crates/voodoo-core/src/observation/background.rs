@@ -38,12 +38,6 @@ pub(super) fn pose_difference(a: &Pose, b: &Pose) -> (f64, f64) {
     (a.translation.distance(b.translation), a.rotation.angle_between(b.rotation))
 }
 
-/// Whether a camera is still at its previous pose.
-fn is_static(a: &Pose, b: &Pose) -> bool {
-    let (meters, radians) = pose_difference(a, b);
-    a == b || (meters <= STANDS.0 && radians <= STANDS.1)
-}
-
 impl Background {
     /// Whether a return at `z` meters in pixel `index` belongs to the background.
     #[inline(always)]
@@ -53,7 +47,12 @@ impl Background {
 
     /// Whether this background belongs to the image: to the same camera at the same pose.
     pub(super) fn fits(&self, image: &DepthImage) -> bool {
-        self.is_sized_like(image) && is_static(&self.world_from_sensor, &image.world_from_sensor)
+        let (a, b) = (&self.world_from_sensor, &image.world_from_sensor);
+        let stands = || {
+            let (meters, radians) = pose_difference(a, b);
+            meters <= STANDS.0 && radians <= STANDS.1
+        };
+        self.is_sized_like(image) && (a == b || stands())
     }
 
     pub(super) fn is_sized_like(&self, image: &DepthImage) -> bool {
@@ -87,8 +86,9 @@ impl Backgrounds {
     /// of the cameras.
     pub(super) fn mask(&mut self, frame: &Frame, ownership: OwnershipMask) {
         let is_others = |owner: &u16| *owner != NO_OWNER && *owner != ownership.own;
-        self.others.resize_with(ownership.cloud_owners.len(), Vec::new);
-        for (others, owners) in self.others.iter_mut().zip(ownership.cloud_owners) {
+        let of_clouds = ownership.owners.get(frame.images.len()..).unwrap_or(&[]);
+        self.others.resize_with(of_clouds.len(), Vec::new);
+        for (others, owners) in self.others.iter_mut().zip(of_clouds) {
             refill(others, owners.iter().map(is_others));
         }
         if frame.images.is_empty() {

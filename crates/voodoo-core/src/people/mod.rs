@@ -200,7 +200,10 @@ impl People {
         }
         self.prune_tracks();
         self.find_new(frame, &shown);
-        self.delete_expired(frame.stamp);
+        // Persons who have been absent for too long are deleted.
+        let forget_after = self.options.forget_after;
+        self.persons
+            .retain(|person| person.present || person.followed || frame.stamp - person.last_tracked < forget_after);
     }
 
     /// Assigns every pixel and free point to the person whose surface explains it.
@@ -273,12 +276,6 @@ impl People {
             let is_followed = self.options.allows(place) && self.options.includes(self.persons[newer].id);
             self.persons[newer].present &= is_followed;
         }
-    }
-
-    /// Deletes persons who have been absent for too long.
-    fn delete_expired(&mut self, stamp: f64) {
-        let forget_after = self.options.forget_after;
-        self.persons.retain(|person| person.present || person.followed || stamp - person.last_tracked < forget_after);
     }
 }
 
