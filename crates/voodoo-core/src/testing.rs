@@ -120,7 +120,7 @@ pub(crate) fn with_setting<R>(
         let mut observer = Observer::default();
         let scene = if config.background { wall(frame) } else { Backgrounds::default() };
         let bounds = body_box(&model.body, poses, config.body_box_margin);
-        observer.begin(frame, everything(&scene));
+        observer.begin(frame, everything(&scene), None);
         let observation = observer.gather(frame, Vec3::ZERO, &bounds, everything(&scene), config);
         check(Setting { config, observation, previous: poses, time_scale: 1.0 })
     })

@@ -2,7 +2,6 @@
 
 use crate::math::{Pose, refill};
 use crate::observation::frame::{DepthImage, Frame};
-use crate::observation::observer::Own;
 use crate::observation::ownership::{NO_OWNER, OwnershipMask};
 
 /// A pixel belongs to the background unless it lies more than this in front of it: meters, plus a fraction of the depth, because
@@ -105,12 +104,12 @@ impl Backgrounds {
         }
     }
 
-    /// Sets the learned depth to unknown at pixels that show a person. Depths learned behind the person stay: without them, the
+    /// Sets the learned depth to unknown at pixels, of the image with this index, that show a person. Depths learned behind the person stay: without them, the
     /// background would look like a flat body once the person is gone.
-    pub(crate) fn release(&mut self, frame: &Frame, own: Own) {
-        let Some(image) = frame.images.get(own.image) else { return };
+    pub(crate) fn release(&mut self, frame: &Frame, image: usize, pixels: &[usize]) {
+        let Some(image) = frame.images.get(image) else { return };
         let Some(depth) = self.depth_mut(image) else { return };
-        for pixel in own.pixels {
+        for pixel in pixels {
             if let Some(depth) = depth.get_mut(*pixel)
                 && image.depth(*pixel).is_none_or(|z| Background::contains(*depth, z))
             {

@@ -8,7 +8,6 @@ use crate::body::Body;
 use crate::detect::{Detected, DetectionQuery, PlacedDetection, Surroundings, fit_body};
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::{DepthImage, Frame, PositionRelation};
-use crate::observation::observer::Own;
 use crate::observation::ownership::NO_OWNER;
 
 /// Shortest time between two detections in pixels that no person explains, seconds, while anybody is tracked.
@@ -321,7 +320,7 @@ impl People {
 
     /// Starts a person's tracker at a tentative track, in the pixels whose owner is `own`. Returns whether the person is there.
     fn reactivate(&mut self, frame: &Frame, track: &TentativeTrack, number: usize, own: usize) -> bool {
-        self.scene.known.release(frame, Own { image: track.image, pixels: &track.detection.pixels });
+        self.scene.known.release(frame, track.image, &track.detection.pixels);
         let person = &mut self.persons[number];
         if !self.options.includes(person.id) {
             return false;

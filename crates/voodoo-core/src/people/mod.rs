@@ -21,7 +21,6 @@ use crate::detect::{BoundDetector, Detect, DetectError};
 use crate::error::TrackError;
 use crate::math::Vec3;
 use crate::observation::frame::{DetectedPerson, Frame};
-use crate::observation::observer::Own;
 use crate::threads::Threads;
 use crate::tracker::BodyTracker;
 use births::NEW;
@@ -188,7 +187,7 @@ impl People {
         self.follow(frame, own, &shown);
         for person in &self.persons {
             if let Some((image, pixels)) = person.tracker.moved_to().filter(|_| person.present) {
-                self.scene.known.release(frame, Own { image, pixels });
+                self.scene.known.release(frame, *image, pixels);
             }
         }
         // A lost person must not become part of the scene, and is searched for in the pixels assigned to them as well.

@@ -139,7 +139,6 @@ fn learn_pixel(known: &mut f32, tentative: &mut f32, frames: &mut u8, z: f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::observation::observer::Own;
     use crate::testing::with_frame;
 
     const PIXELS: usize = 160 * 124;
@@ -189,7 +188,7 @@ mod tests {
             let mut scene = SceneModel::default();
             (0..3).for_each(|frame| feed(&mut scene, 5000, frame, |_, _| ()));
             feed(&mut scene, came, 3, |scene, frame| {
-                scene.known.release(frame, Own { image: 0, pixels: &[7] });
+                scene.known.release(frame, 0, &[7]);
                 assert_eq!(scene.known.depth(&frame.images[0])[7..9], [left, 5.0]);
             });
         }

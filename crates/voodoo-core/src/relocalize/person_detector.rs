@@ -7,7 +7,6 @@ use crate::body::Body;
 use crate::detect::{Detected, DetectionQuery, PlacedDetection, Surroundings};
 use crate::math::Vec3;
 use crate::observation::frame::{Frame, Ground};
-use crate::observation::observer::Own;
 use crate::observation::ownership::OwnershipMask;
 
 impl Relocalizer {
@@ -21,10 +20,10 @@ impl Relocalizer {
         self.detection.as_ref().map(|detection| Detected { detection: &detection.detection, map: &self.detector.map })
     }
 
-    /// Returns the pixels of the detection.
-    pub(crate) fn own_pixels(&self) -> Own<'_> {
-        let pixels = self.detection.as_ref().map_or(&[][..], |detection| &detection.detection.pixels);
-        Own { image: self.image, pixels }
+    /// Returns the index of the image and the pixels of the detection.
+    pub(crate) fn own_pixels(&self) -> (usize, Vec<usize>) {
+        let found = self.detection.as_ref();
+        (self.image, found.map_or_else(Vec::new, |found| found.detection.pixels.clone()))
     }
 
     /// Records how the track was started: `auto_initialized` by the detector, whose detection tells the floor, or by the user.

@@ -16,7 +16,7 @@ use crate::hypotheses::Hypotheses;
 use crate::math::{Pose, Vec3, is_rigid, refill};
 use crate::observation::candidates::body_box;
 use crate::observation::frame::Frame;
-use crate::observation::observer::{Observer, Own};
+use crate::observation::observer::Observer;
 use crate::observation::ownership::OwnershipMask;
 use crate::relocalize::{DetectionVerdict, Reasons, Relocalizer, distance_cost, trunk_is_elsewhere};
 use crate::sizes::{Sizes, Start};
@@ -297,10 +297,7 @@ impl BodyTracker {
         // Predicted pose, and candidates around it (step 1 of K06 IV-B).
         let time_scale = motion.advance(&model.body, frame.stamp, config.prediction, whole_body);
         let Motion { poses, previous, predicted, origin, .. } = motion;
-        observer.begin(frame, ownership);
-        if let Some((image, pixels)) = moved_to {
-            observer.release(frame, ownership, Own { image: *image, pixels });
-        }
+        observer.begin(frame, ownership, moved_to.as_ref());
         let bounds = body_box(&model.body, poses, config.body_box_margin);
         let observation = observer.gather(frame, *origin, &bounds, ownership, config);
         let setting = Setting { config, observation, previous, time_scale };
@@ -361,8 +358,8 @@ impl BodyTracker {
     /// Whether the body explains the frame better at the current detection than where it is expected.
     fn is_at_detection(&mut self, frame: &Frame, ownership: OwnershipMask) -> bool {
         let Self { config, model, motion, observer, fit, relocalizer, assessor, .. } = self;
-        observer.begin(frame, ownership);
-        observer.release(frame, ownership, relocalizer.own_pixels());
+        let own = relocalizer.own_pixels();
+        observer.begin(frame, ownership, Some(&own));
         let observation = observer.observation(frame, motion.origin, ownership);
         let previous = if motion.stamp.is_some() { &motion.poses[..] } else { &[] };
         let setting = Setting { config, observation, previous, time_scale: 1.0 };
@@ -370,8 +367,7 @@ impl BodyTracker {
         fit.forget_detected();
         let is_there = relocalizer.try_detected(setting.with_model(model), fit, &motion.predicted, lost);
         if is_there {
-            let Own { image, pixels } = relocalizer.own_pixels();
-            self.moved_to = Some((image, pixels.to_vec()));
+            self.moved_to = Some(own);
         }
         is_there
     }
@@ -382,7 +378,7 @@ impl BodyTracker {
         if !relocalizer.is_searching() {
             return;
         }
-        observer.begin(frame, ownership);
+        observer.begin(frame, ownership, None);
         let observation = observer.observation(frame, motion.origin, ownership);
         let setting = Setting { config, observation, previous: &[], time_scale: 1.0 };
         if relocalizer.search(setting.with_model(model), fit, &motion.predicted) {
@@ -404,7 +400,7 @@ impl BodyTracker {
         self.moved_to = None;
         let Motion { poses, predicted, .. } = &mut self.motion;
         std::mem::swap(poses, predicted);
-        self.observer.begin(frame, ownership);
+        self.observer.begin(frame, ownership, None);
         self.reassess(frame, ownership);
         false
     }
@@ -421,8 +417,8 @@ impl BodyTracker {
     }
 
     /// Index of the image and pixels of the detection to which the body was moved in this frame: they show no scene.
-    pub(crate) fn moved_to(&self) -> Option<(usize, &[usize])> {
-        self.moved_to.as_ref().map(|(image, pixels)| (*image, pixels.as_slice()))
+    pub(crate) fn moved_to(&self) -> Option<&(usize, Vec<usize>)> {
+        self.moved_to.as_ref()
     }
 
     /// Fills the estimate: for a frame `time_scale` after the last one, or, with `None`, for a pose that was set.
