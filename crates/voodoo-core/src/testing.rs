@@ -88,9 +88,9 @@ pub(crate) fn wall(frame: &Frame) -> Backgrounds {
 
 /// Learns the depths of a frame for which `is_scene` holds.
 pub(crate) fn learn(scene: &mut Backgrounds, frame: &Frame, is_scene: impl Fn(f32) -> bool) {
-    scene.register(frame, |_, _| {});
+    scene.register(frame);
     for image in frame.images {
-        for (index, depth) in scene.depth_mut(image).unwrap().iter_mut().enumerate() {
+        for (index, depth) in scene.of_image_mut(image).unwrap().depth.iter_mut().enumerate() {
             *depth =
                 Some(image.pixels.get(index) * image.meters_per_unit as f32).filter(|z| is_scene(*z)).unwrap_or(0.0);
         }

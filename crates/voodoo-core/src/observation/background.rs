@@ -18,10 +18,18 @@ pub(crate) const OTHERS: f32 = f32::MIN_POSITIVE;
 pub(crate) struct Background {
     pub(super) world_from_sensor: Pose,
     pub(super) width: usize,
-    pub(super) depth: Vec<f32>,
+    pub depth: Vec<f32>,
     /// The ray `(x/z, y/z)` on which each depth was observed; empty while the camera has not moved: then it is the ray through
     /// the pixel center.
     pub(super) rays: Vec<[f32; 2]>,
+    /// Recent depth of each pixel where the scene is not known, or of the person there, and the number of consecutive observations:
+    /// it may become part of the scene.
+    pub pending: Vec<f32>,
+    pub frames: Vec<u8>,
+    /// Stamp since which the camera has been at its position, seconds; `None` in the first frame.
+    pub since: Option<f64>,
+    /// Whether the whole image of the second frame was learned.
+    pub filled: bool,
 }
 
 /// The backgrounds of all depth images, in the order of the frame.
@@ -61,7 +69,7 @@ impl Background {
 
 impl Backgrounds {
     /// The background of this image, if its camera has not moved.
-    fn of_image(&self, image: &DepthImage) -> Option<&Background> {
+    pub(crate) fn of_image(&self, image: &DepthImage) -> Option<&Background> {
         self.images.iter().find(|background| background.fits(image))
     }
 
@@ -70,10 +78,9 @@ impl Backgrounds {
         self.of_image(image).map_or(&[], |background| &background.depth)
     }
 
-    /// The learned depths of this image, to be changed.
-    pub(crate) fn depth_mut(&mut self, image: &DepthImage) -> Option<&mut [f32]> {
-        let known = self.images.iter_mut().find(|background| background.fits(image));
-        known.map(|background| background.depth.as_mut_slice())
+    /// The background of this image, to be changed.
+    pub(crate) fn of_image_mut(&mut self, image: &DepthImage) -> Option<&mut Background> {
+        self.images.iter_mut().find(|background| background.fits(image))
     }
 
     /// Whether another person explains a point of a cloud, by the indices of cloud and point.
@@ -108,9 +115,9 @@ impl Backgrounds {
     /// background would look like a flat body once the person is gone.
     pub(crate) fn release(&mut self, frame: &Frame, image: usize, pixels: &[usize]) {
         let Some(image) = frame.images.get(image) else { return };
-        let Some(depth) = self.depth_mut(image) else { return };
+        let Some(known) = self.of_image_mut(image) else { return };
         for pixel in pixels {
-            if let Some(depth) = depth.get_mut(*pixel)
+            if let Some(depth) = known.depth.get_mut(*pixel)
                 && image.depth(*pixel).is_none_or(|z| Background::contains(*depth, z))
             {
                 *depth = 0.0;
@@ -118,12 +125,11 @@ impl Backgrounds {
         }
     }
 
-    /// Gives every image of a frame a background, if only an empty one. `moved` is called with the index of each image whose
-    /// camera moved, and with whether the learned depths were carried over.
-    pub(crate) fn register(&mut self, frame: &Frame, mut moved: impl FnMut(usize, bool)) {
-        for (number, image) in frame.images.iter().enumerate() {
+    /// Gives every image of a frame a background: an empty one for a new camera, or one that moved far.
+    pub(crate) fn register(&mut self, frame: &Frame) {
+        for image in frame.images {
             if self.of_image(image).is_none() {
-                moved(number, self.carry_over(image, frame));
+                self.carry_over(image, frame);
             }
         }
     }
@@ -153,7 +159,7 @@ mod tests {
             if known {
                 learn(&mut backgrounds, &frame, |_| true);
             }
-            backgrounds.register(&frame, |_, _| {});
+            backgrounds.register(&frame);
             [0.0, 1.0, 2.0].map(|x| {
                 let learned = backgrounds.of_image(&image(x)).map(|known| &known.depth);
                 learned.map(|depth| depth.iter().filter(|depth| **depth > 0.0).count())

@@ -242,8 +242,8 @@ mod tests {
         let frame = Frame { images: &images, ground, ..Frame::empty(0.0) };
         let mut backgrounds = Backgrounds::default();
         // Everything farther than 2.6 m is scene.
-        backgrounds.register(&frame, |_, _| {});
-        let depths = backgrounds.depth_mut(&images[0]).unwrap();
+        backgrounds.register(&frame);
+        let depths = &mut backgrounds.of_image_mut(&images[0]).unwrap().depth;
         depths.iter_mut().zip(&pixels).for_each(|(depth, z)| *depth = 2.6 + 1e-6 * if *z > 0.0 { *z } else { 0.0 });
         let origin = Vec3::new(2.3, 0.0, 1.0);
         let bounds = Aabb::new(Vec3::new(-0.4, -0.3, -0.6), Vec3::new(0.4, 0.5, 0.4));

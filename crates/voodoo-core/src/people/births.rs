@@ -100,7 +100,7 @@ impl People {
 
     /// Whether somebody may be in what does not move: before every view was searched, and while somebody is lost.
     fn searches_everywhere(&self, frame: &Frame) -> bool {
-        let searched = (0..frame.images.len()).all(|number| self.scene.is_old(number, frame.stamp));
+        let searched = frame.images.iter().all(|image| self.scene.is_old(image, frame.stamp));
         self.followed().is_none()
             && (!searched || self.persons.iter().any(|person| person.present && !person.is_tracked()))
     }
@@ -145,7 +145,7 @@ impl People {
             excluded: frame.excluded,
             owners: self.assignment.owners.get(number).map_or(&[], Vec::as_slice),
             // A person may have stood there since the camera started, so only an old background is excluded.
-            background: if self.scene.is_old(number, frame.stamp) { scene } else { &[] },
+            background: if self.scene.is_old(image, frame.stamp) { scene } else { &[] },
             ..Surroundings::default()
         };
         let mut found = self.detector.detect(&self.prototype, image, &around, query);

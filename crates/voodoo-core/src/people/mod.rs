@@ -180,13 +180,13 @@ impl People {
         self.refusal = None;
         self.detector.error = None;
         if self.config.background {
-            self.scene.register(frame);
+            self.scene.known.register(frame);
         }
         self.assign_pixels(frame);
         let shown = self.match_detections(frame);
         self.follow(frame, own, &shown);
         for person in &self.persons {
-            if let Some((image, pixels)) = person.tracker.moved_to().filter(|_| person.present) {
+            if let Some((image, pixels)) = person.tracker.moved_to.as_ref().filter(|_| person.present) {
                 self.scene.known.release(frame, *image, pixels);
             }
         }

@@ -30,6 +30,7 @@ use lines::{Line, Viewer, depth_beside};
 use models::ColorModel;
 use pixel_gain::camera_from_limb_at;
 use scan::{EdgeSearch, ScanView};
+use std::collections::BTreeMap;
 
 /// The edge search of each step of a frame: wide and coarse at first, then narrower and finer.
 const SEARCHES: [EdgeSearch; STEPS] = [
@@ -54,7 +55,6 @@ const FOCAL: f64 = 520.0;
 /// What was learned from the images of one camera, and working memory.
 #[derive(Debug, Default)]
 struct Learned {
-    number: u16,
     /// Pixels per unit in the last image.
     unit: f32,
     model: ColorModel,
@@ -72,7 +72,8 @@ pub(crate) const STEPS: usize = 4;
 /// Colors of the body and its surroundings for each camera, and the lines of the last search.
 #[derive(Debug, Default)]
 pub(crate) struct ColorRegions {
-    cameras: Vec<Learned>,
+    /// By number of the camera.
+    cameras: BTreeMap<u16, Learned>,
     /// Group of every limb: the limbs of one group have the same colors.
     groups: Vec<u16>,
     /// Time of the last frame, seconds.
@@ -147,7 +148,7 @@ impl ColorRegions {
     /// Resets the learned colors of bodies and surroundings.
     pub(crate) fn clear(&mut self) {
         (self.stamp, self.turn) = (None, 0);
-        self.cameras.iter_mut().for_each(|camera| camera.known = false);
+        self.cameras.values_mut().for_each(|camera| camera.known = false);
     }
 
     /// Sets the empty scene of a camera from images with their heights and widths; without images, removes it.
@@ -157,7 +158,7 @@ impl ColorRegions {
         pictures: &[(ColorPixels, [usize; 2])],
     ) -> Result<(), TrackError> {
         let scene = if pictures.is_empty() { None } else { Some(EmptyScene::from_pictures(pictures)?) };
-        self.camera(camera).scene = scene;
+        self.cameras.entry(camera).or_default().scene = scene;
         Ok(())
     }
 
@@ -167,7 +168,7 @@ impl ColorRegions {
             let expected = "a pinhole camera: take the distortion out of the picture";
             let (what, lens) = (format_args!("color[{index}].camera"), picture.camera.lens());
             TrackError::unless(!picture.camera.distorts(), what, expected, format_args!("{lens:?}"))?;
-            let known = self.cameras.iter().find(|camera| camera.number == picture.number);
+            let known = self.cameras.get(&picture.number);
             known.and_then(|camera| camera.scene.as_ref()).map_or(Ok(()), |scene| scene.check(picture, index))?;
         }
         Ok(())
@@ -177,12 +178,12 @@ impl ColorRegions {
     pub(crate) fn begin(&mut self, posed: Posed) {
         if self.groups != posed.body.roles().groups() {
             posed.body.roles().groups().clone_into(&mut self.groups);
-            self.cameras.iter_mut().for_each(|camera| camera.known = false);
+            self.cameras.values_mut().for_each(|camera| camera.known = false);
         }
         for picture in posed.frame.colors {
             let kind = Kind::new(&picture.pixels);
             let groups = self.groups.iter().map(|group| usize::from(*group) + 1).max().unwrap_or(0);
-            let camera = self.camera(picture.number);
+            let camera = self.cameras.entry(picture.number).or_default();
             if camera.known && camera.model.kind == kind {
                 continue;
             }
@@ -226,9 +227,7 @@ impl ColorRegions {
         for picture in posed.frame.colors {
             self.place_lines(picture, posed);
             let Self { cameras, groups, evidence, .. } = self;
-            let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.number && camera.known) else {
-                continue;
-            };
+            let Some(camera) = cameras.get_mut(&picture.number).filter(|camera| camera.known) else { continue };
             let mut edges = std::mem::take(&mut camera.edges);
             let (unit, lines, view) = (camera.unit, &camera.lines, camera.view(picture, &camera.labels, groups));
             let working_from_camera = shifted(&picture.world_from_sensor, posed.origin);
@@ -262,8 +261,7 @@ impl ColorRegions {
 
     /// The lines of the last search in a camera's image.
     pub(crate) fn lines(&self, camera: u16) -> impl Iterator<Item = RegionLine> + '_ {
-        let camera = self.cameras.iter().find(|known| known.number == camera);
-        camera.into_iter().flat_map(|camera| {
+        self.cameras.get(&camera).into_iter().flat_map(|camera| {
             let unit = camera.unit;
             camera.lines.iter().zip(&camera.edges).map(move |(line, found)| {
                 let [mean, information] = found.map_or([0.0; 2], |edge| [edge.mean, edge.information]);
@@ -286,21 +284,14 @@ impl ColorRegions {
         self.stamp = Some(frame.stamp);
     }
 
-    fn camera(&mut self, number: u16) -> &mut Learned {
-        let index = self.cameras.iter().position(|camera| camera.number == number).unwrap_or_else(|| {
-            self.cameras.push(Learned { number, ..Learned::default() });
-            self.cameras.len() - 1
-        });
-        &mut self.cameras[index]
-    }
-
     /// Places the lines of one image.
     fn place_lines(&mut self, picture: &ColorImage, posed: Posed) {
         let limb = camera_from_limb_at(self.stamp, picture, posed);
         let mut camera_from_limb = std::mem::take(&mut self.camera_from_limb);
         refill(&mut camera_from_limb, (0..posed.poses.len()).map(limb));
         let [fx, fy] = picture.camera.focal();
-        let (body, Learned { unit, labels, lines, .. }) = (posed.body, self.camera(picture.number));
+        let body = posed.body;
+        let Learned { unit, labels, lines, .. } = self.cameras.entry(picture.number).or_default();
         *unit = (0.5 * (fx + fy) / FOCAL) as f32;
         labels.draw(body, &camera_from_limb, picture.camera, CELL_BITS, |_| true);
         lines.clear();
@@ -319,7 +310,7 @@ impl ColorRegions {
     /// Learns the colors along the lines of one image, except those of limbs with weak evidence.
     fn teach(&mut self, picture: &ColorImage) {
         let Self { cameras, groups, evidence, .. } = self;
-        let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.number) else { return };
+        let Some(camera) = cameras.get_mut(&picture.number) else { return };
         let unit = camera.unit;
         // When the evidence is weak for many limbs at once, the light has changed.
         let light = evidence.iter().filter(|evidence| evidence.is_weak()).count() > MANY;

@@ -53,8 +53,8 @@ impl ColorRegions {
         let shape = &posed.body.limbs()[limb].shape;
         let group = usize::from(self.groups[limb]);
         for (picture, labels) in posed.frame.colors.iter().zip(&self.backdrop) {
-            let known = self.cameras.iter().find(|camera| camera.number == picture.number && camera.known);
-            let Some(camera) = known.filter(|camera| camera.model.knows(group)) else { continue };
+            let known = self.cameras.get(&picture.number);
+            let Some(camera) = known.filter(|camera| camera.known && camera.model.knows(group)) else { continue };
             let view = camera.view(picture, labels, &self.groups);
             let camera_from_limb = camera_from_limb_at(self.stamp, picture, posed)(limb);
             places(shape, &camera_from_limb, picture.camera, |[u, v], depth, area| {

@@ -37,7 +37,7 @@ impl ColorRegions {
         self.place_lines(picture, posed);
         let [width, height] = [picture.camera.width(), picture.camera.height()];
         let mut likely = vec![0.0; width * height];
-        let Some(camera) = self.cameras.iter().find(|camera| camera.number == picture.number) else { return likely };
+        let Some(camera) = self.cameras.get(&picture.number) else { return likely };
         let view = camera.view(picture, &camera.labels, &self.groups);
         let cell = 1_usize << super::CELL_BITS;
         let cells = distances(&camera.labels, cell as f32 / camera.unit);

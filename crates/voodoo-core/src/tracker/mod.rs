@@ -60,8 +60,8 @@ pub struct BodyTracker {
     uncertainty: Uncertainty,
     estimate: Estimate,
     before: Before,
-    /// Index of the image and pixels of the detection to which the body was moved in this frame.
-    moved_to: Option<(usize, Vec<usize>)>,
+    /// Index of the image and pixels of the detection to which the body was moved in this frame: they show no scene.
+    pub(crate) moved_to: Option<(usize, Vec<usize>)>,
 }
 
 impl BodyTracker {
@@ -414,11 +414,6 @@ impl BodyTracker {
         fit.match_all(setting.with_model(model), poses, config.max_steps, true);
         assessor.moved();
         assessor.assess(setting.with_model(model), fit.matched(poses), None);
-    }
-
-    /// Index of the image and pixels of the detection to which the body was moved in this frame: they show no scene.
-    pub(crate) fn moved_to(&self) -> Option<&(usize, Vec<usize>)> {
-        self.moved_to.as_ref()
     }
 
     /// Fills the estimate: for a frame `time_scale` after the last one, or, with `None`, for a pose that was set.
