@@ -65,13 +65,10 @@ impl BoundDetector {
             }
             Ok(found)
         });
-        let found = match checked {
-            Ok(found) => found,
-            Err(error) => {
-                self.error = Some(error);
-                return Vec::new();
-            }
-        };
+        let found = checked.unwrap_or_else(|error| {
+            self.error = Some(error);
+            Vec::new()
+        });
         let map = &self.map;
         let placed = |(index, detection): (usize, Detection)| {
             let root = place(body, Detected { detection: &detection, map })?;

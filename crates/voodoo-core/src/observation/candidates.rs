@@ -61,9 +61,8 @@ impl Candidates {
             Some(ground) => (ground.normal, ground.relative_to(origin).offset + config.ground_clearance),
             None => (Vec3::ZERO, -1.0),
         };
-        let to_f32 = |v: Vec3| v.to_array().map(|value| value as f32);
-        let gate =
-            PointGate { low: to_f32(bounds.mins), high: to_f32(bounds.maxs), up: to_f32(up), floor: floor as f32 };
+        let [low, high, up] = [bounds.mins, bounds.maxs, up].map(|v| v.as_vec3().to_array());
+        let gate = PointGate { low, high, up, floor: floor as f32 };
         for view in views.iter() {
             let first = self.points.len();
             self.gather_image(&view, bounds, &gate, config.max_points);

@@ -308,7 +308,7 @@ impl Ground {
 /// assert!(frame.check(&body, Some(1.0)).is_err()); // not after the previous frame
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Frame<'a> {
     /// Seconds.
     pub stamp: f64,
@@ -333,8 +333,7 @@ pub struct Frame<'a> {
 impl Frame<'_> {
     /// A frame without measurements.
     pub fn empty(stamp: f64) -> Self {
-        let (clouds, images, colors, positions, rays, detections, excluded) = Default::default();
-        Self { stamp, clouds, images, colors, positions, rays, detections, ground: None, excluded }
+        Self { stamp, ..Self::default() }
     }
 
     /// Returns an error for unusable input, before any of it reaches the tracker's state.

@@ -341,7 +341,7 @@ impl People {
         if came {
             person.present = true;
             person.created = person.created.min(frame.stamp);
-            person.update_stature(detected);
+            detected.stature().into_iter().for_each(|reported| person.stature.update(reported));
         }
         person.update(frame, ownership);
         // A lost person's own tracker may have found them in the same frame.

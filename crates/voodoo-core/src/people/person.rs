@@ -43,7 +43,7 @@ pub(super) struct Person {
     /// Last tracked position of the root, world frame.
     pub(super) place: Vec3,
     /// The detected stature.
-    stature: LengthEstimate,
+    pub(super) stature: LengthEstimate,
     /// Colors of their clothes.
     pub(super) clothes: Clothes,
     last_clothes: f64,
@@ -87,13 +87,6 @@ impl Person {
     /// Whether the person is present and not lost.
     pub(super) fn is_tracked(&self) -> bool {
         self.present && self.tracker.is_there()
-    }
-
-    /// Updates the stature with a detection.
-    pub(super) fn update_stature(&mut self, detected: Detected) {
-        if let Some(reported) = detected.stature() {
-            self.stature.update(reported);
-        }
     }
 
     /// Returns the cost of the person's being at a position, nats.

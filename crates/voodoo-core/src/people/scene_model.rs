@@ -64,7 +64,12 @@ impl SceneModel {
                 let (mut new, mut width) = (0, 0.0);
                 for index in row * image.camera.width()..(row + 1) * image.camera.width() {
                     let seen = image.depth(index).filter(|_| owners[index] == NO_OWNER);
-                    match seen.filter(|z| is_new(known[index], pending[index], *z)) {
+                    // Something new is clearly before the known scene, or where nothing was seen before.
+                    let is_new = |z: &f32| {
+                        known[index] == 0.0 && pending[index] == 0.0
+                            || *z < known[index] - DEPTH_STEP && !Background::contains(known[index], *z)
+                    };
+                    match seen.filter(is_new) {
                         Some(z) => (new, width) = (new + 1, width + f64::from(z) / image.camera.focal()[0]),
                         None => (new, width) = (0, 0.0),
                     }
@@ -88,11 +93,6 @@ impl SceneModel {
         };
         2 * pixels.iter().filter(still).count() > pixels.len()
     }
-}
-
-/// Whether a return is clearly before the known scene, or where nothing was seen before.
-fn is_new(known: f32, tentative: f32, z: f32) -> bool {
-    known == 0.0 && tentative == 0.0 || z < known - DEPTH_STEP && !Background::contains(known, z)
 }
 
 fn learn_pixel(known: &mut f32, tentative: &mut f32, frames: &mut u8, z: f32) {

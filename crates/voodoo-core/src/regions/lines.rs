@@ -1,6 +1,7 @@
 //! Lines across the contour of limbs: their positions in an image, and what borders the limb there.
 
 use super::labels::{LimbLabels, NOTHING};
+use super::scan::LineEdge;
 use crate::body::Body;
 use crate::camera::{Camera, NEAREST_RETURN};
 use crate::math::{Pose, Vec3};
@@ -39,6 +40,8 @@ pub(super) struct Line {
     pub both: bool,
     /// Whether something other than the body occludes it.
     pub hidden: bool,
+    /// The edge that was found on it.
+    pub edge: Option<LineEdge>,
 }
 
 /// A depth camera within this distance of another camera has the same view, meters.
@@ -137,6 +140,7 @@ impl Viewer<'_> {
             clear: clear && !hidden,
             both: false,
             hidden,
+            edge: None,
         })
     }
 

@@ -61,8 +61,6 @@ struct Learned {
     scene: Option<EmptyScene>,
     labels: LimbLabels,
     lines: Vec<Line>,
-    /// The edge found on each line.
-    edges: Vec<Option<scan::LineEdge>>,
     known: bool,
 }
 
@@ -228,17 +226,15 @@ impl ColorRegions {
             self.place_lines(picture, posed);
             let Self { cameras, groups, evidence, .. } = self;
             let Some(camera) = cameras.get_mut(&picture.number).filter(|camera| camera.known) else { continue };
-            let mut edges = std::mem::take(&mut camera.edges);
-            let (unit, lines, view) = (camera.unit, &camera.lines, camera.view(picture, &camera.labels, groups));
+            let mut lines = std::mem::take(&mut camera.lines);
+            let (unit, view) = (camera.unit, camera.view(picture, &camera.labels, groups));
             let working_from_camera = shifted(&picture.world_from_sensor, posed.origin);
-            edges.clear();
-            edges.reserve(lines.capacity());
             pairs.reserve(lines.capacity());
-            for line in lines {
+            for line in &mut lines {
                 let limb = usize::from(line.limb);
                 let searched = is_requested.is_none_or(|is_requested| is_requested(limb));
                 let found = if searched { scan::edge_on(&view, line, search, together) } else { None };
-                edges.push(found);
+                line.edge = found;
                 if together {
                     let length = posed.body.limbs()[limb].shape.length();
                     evidence[limb].take(line.foot.z / length, found.map(|found| found.beside));
@@ -255,7 +251,7 @@ impl ColorRegions {
                     source: picture.source,
                 });
             }
-            camera.edges = edges;
+            camera.lines = lines;
         }
     }
 
@@ -263,8 +259,8 @@ impl ColorRegions {
     pub(crate) fn lines(&self, camera: u16) -> impl Iterator<Item = RegionLine> + '_ {
         self.cameras.get(&camera).into_iter().flat_map(|camera| {
             let unit = camera.unit;
-            camera.lines.iter().zip(&camera.edges).map(move |(line, found)| {
-                let [mean, information] = found.map_or([0.0; 2], |edge| [edge.mean, edge.information]);
+            camera.lines.iter().map(move |line| {
+                let [mean, information] = line.edge.map_or([0.0; 2], |edge| [edge.mean, edge.information]);
                 RegionLine {
                     limb: usize::from(line.limb),
                     place: line.place,
