@@ -19,7 +19,8 @@ pub(crate) struct Assignment {
 }
 
 impl Assignment {
-    /// Step 2: assigns the candidates to limbs by the limbs' enlarged boxes and the overlap policy; `buried` limbs get none.
+    /// Step 2: assigns the candidates to limbs by the limbs' enlarged boxes and the overlap policy; without `buried`, limbs
+    /// inside other limbs get none.
     pub(crate) fn assign(
         &mut self,
         body: &Body,
@@ -27,7 +28,7 @@ impl Assignment {
         candidates: &Candidates,
         overlap: Overlap,
         box_margin: f64,
-        buried: &[bool],
+        buried: bool,
     ) {
         let Self { members, search, nearest } = self;
         // One more list for the candidates outside all boxes.
@@ -185,7 +186,7 @@ mod tests {
     fn holders(overlap: Overlap) -> (Body, Vec<Pose>, Candidates, Vec<Vec<usize>>) {
         let (body, poses, candidates) = scene();
         let mut assignment = Assignment::default();
-        assignment.assign(&body, &poses, &candidates, overlap, MARGIN, &[]);
+        assignment.assign(&body, &poses, &candidates, overlap, MARGIN, true);
         let mut holders = vec![Vec::new(); candidates.len()];
         for (limb, members) in assignment.members[..poses.len()].iter().enumerate() {
             assert!(members.is_sorted_by(|a, b| a < b), "ascending, none twice");

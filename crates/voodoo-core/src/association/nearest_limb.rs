@@ -4,6 +4,7 @@
 //! The bounding box of a cluster of points gives a lower bound of the distance to every limb. Only limbs that can still be the
 //! nearest of some point are evaluated point by point.
 
+use super::buried::is_buried;
 use crate::body::{Body, Limb};
 use crate::math::{LANES, Pose, Vec3, refill, vectorized};
 use crate::observation::clusters::{Bounds, CLUSTER, Cluster, Clusters};
@@ -26,6 +27,8 @@ type Squares = [f32; CLUSTER];
 #[derive(Debug, Default)]
 pub(crate) struct NearestLimb {
     limbs: Vec<LimbBox>,
+    /// Bounding spheres of the limbs.
+    spheres: Vec<(Vec3, f64)>,
     groups: Vec<Group>,
     least: Vec<LimbLanes>,
     /// The limbs that were nearest to two points of each cluster in the last call: evaluated first, as they are probably nearest
@@ -34,12 +37,15 @@ pub(crate) struct NearestLimb {
 }
 
 impl NearestLimb {
-    /// Sets the limb poses, with the boxes enlarged by `margin`. `buried` limbs contain no point; an empty slice means that none
-    /// is buried.
-    pub(crate) fn place(&mut self, body: &Body, poses: &[Pose], margin: f64, buried: &[bool]) {
-        refill(&mut self.limbs, body.limbs().iter().zip(poses).map(|(limb, pose)| LimbBox::new(limb, pose, margin)));
-        for (limb, _) in self.limbs.iter_mut().zip(buried).filter(|(_, buried)| **buried) {
-            (limb.low, limb.high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    /// Sets the limb poses, with the boxes enlarged by `margin`. Without `buried`, limbs inside other limbs contain no point.
+    pub(crate) fn place(&mut self, body: &Body, poses: &[Pose], margin: f64, buried: bool) {
+        let limbs = || body.limbs().iter().zip(poses);
+        refill(&mut self.limbs, limbs().map(|(limb, pose)| LimbBox::new(limb, pose, margin)));
+        refill(&mut self.spheres, limbs().map(|(limb, pose)| limb.shape.sphere(pose)));
+        for (index, limb) in self.limbs.iter_mut().enumerate().filter(|_| !buried) {
+            if is_buried(body, poses, &self.spheres, index) {
+                (limb.low, limb.high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+            }
         }
         refill(&mut self.groups, self.limbs.chunks(LANES).map(Group::new));
     }
@@ -65,7 +71,7 @@ impl NearestLimb {
 
     #[inline(always)]
     fn find_cluster(&mut self, index: usize, cluster: &Cluster) -> [u32; CLUSTER] {
-        let Self { limbs, groups, least, expected } = self;
+        let Self { limbs, groups, least, expected, .. } = self;
         for (least, group) in least.iter_mut().zip(groups) {
             *least = group.least_squares(cluster.bounds);
         }
@@ -310,7 +316,7 @@ mod tests {
             let points = around(seed);
             clusters.arrange(&points);
             let mut nearest = vec![NONE; points.len()];
-            search.place(&body, &poses, margin, &[]);
+            search.place(&body, &poses, margin, true);
             search.find(&clusters, &mut nearest);
             let mut found = 0;
             for (index, nearest) in nearest.iter().enumerate() {

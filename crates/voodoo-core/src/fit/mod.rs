@@ -9,7 +9,6 @@ pub(crate) use context::{Context, Matched, Setting};
 pub(crate) use motion::{Motion, UNKNOWN_MOTION};
 
 use crate::association::assignment::{Assignment, match_limb};
-use crate::association::buried::Buried;
 use crate::association::contour::Contours;
 use crate::association::correspondence::{Correspondences, DetectedPair, LimbMatches};
 use crate::association::visible_side::match_visible_side;
@@ -32,7 +31,6 @@ pub(crate) struct Fit {
     warm_start: WarmStart,
     whole_body: WholeBody,
     assignment: Assignment,
-    buried: Buried,
     /// The last correspondences.
     pub(crate) correspondences: Correspondences,
     /// The depth-contour edges that were found last.
@@ -55,7 +53,6 @@ impl Fit {
             warm_start: WarmStart::default(),
             whole_body: WholeBody::default(),
             assignment: Assignment::default(),
-            buried: Buried::default(),
             correspondences: Correspondences::default(),
             contours: Contours::default(),
             regions: regions::ColorRegions::default(),
@@ -223,7 +220,7 @@ impl Fit {
     fn assign(&mut self, context: Context, poses: &[Pose], gate: &Gate) {
         let Context { config, model, observation, .. } = context;
         // The published solver uses points anywhere on its limbs.
-        let buried = if config.solver.is_whole_body() { self.buried.find(&model.body, poses) } else { &[] };
+        let buried = !config.solver.is_whole_body();
         self.assignment.assign(&model.body, poses, observation.candidates, config.overlap, gate.box_margin, buried);
     }
 

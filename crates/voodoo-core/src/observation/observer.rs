@@ -32,11 +32,6 @@ impl<'a> Observation<'a> {
     pub(crate) fn floor(&self) -> Option<Ground> {
         self.frame().ground.map(|ground| ground.relative_to(self.origin()))
     }
-
-    /// The same frame with other candidates.
-    pub(crate) fn with(self, candidates: &'a Candidates) -> Self {
-        Self { candidates, ..self }
-    }
 }
 
 /// Holds the candidates of the current frame.

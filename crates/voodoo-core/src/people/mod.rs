@@ -152,13 +152,6 @@ impl People {
         Ok(self.next_id - 1)
     }
 
-    /// Forgets everybody but the first person, and the scene. The next frame may have any stamp.
-    fn forget_others(&mut self) {
-        self.persons.truncate(1);
-        (self.scene, self.tentative) = Default::default();
-        (self.last_detection, self.stamp) = (None, None);
-    }
-
     /// Returns a person with the next number, who is not present yet.
     fn nobody_yet(&self, stamp: f64) -> Result<Person, TrackError> {
         let (body, config) = (self.prototype.clone(), self.config.clone());

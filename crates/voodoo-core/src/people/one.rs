@@ -88,9 +88,12 @@ impl Tracker {
         Ok(self.restarted())
     }
 
-    /// Forgets everybody else, and the scene.
+    /// Forgets everybody else, and the scene. The next frame may have any stamp.
     fn restarted(&mut self) -> &Estimate {
-        self.people.forget_others();
+        let People { persons, scene, tentative, last_detection, stamp, .. } = &mut self.people;
+        persons.truncate(1);
+        (*scene, *tentative) = Default::default();
+        (*last_detection, *stamp) = (None, None);
         let person = self.followed();
         (person.present, person.stays) = (true, true);
         (person.created, person.last_tracked) = (f64::NEG_INFINITY, f64::NEG_INFINITY);

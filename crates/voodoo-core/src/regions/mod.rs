@@ -227,7 +227,7 @@ impl ColorRegions {
             let Self { cameras, groups, evidence, .. } = self;
             let Some(camera) = cameras.get_mut(&picture.number).filter(|camera| camera.known) else { continue };
             let mut lines = std::mem::take(&mut camera.lines);
-            let (unit, view) = (camera.unit, camera.view(picture, &camera.labels, groups));
+            let (unit, view) = (camera.unit, ScanView { picture, camera, labels: &camera.labels, groups });
             let working_from_camera = shifted(&picture.world_from_sensor, posed.origin);
             pairs.reserve(lines.capacity());
             for line in &mut lines {
@@ -318,12 +318,5 @@ impl ColorRegions {
             }
         }
         camera.model.learn();
-    }
-}
-
-impl Learned {
-    /// What is known of this camera's image, behind and beside the limbs that are drawn in `labels`.
-    fn view<'a>(&'a self, picture: &'a ColorImage, labels: &'a LimbLabels, groups: &'a [u16]) -> ScanView<'a> {
-        ScanView { picture, model: &self.model, labels, scene: self.scene.as_ref(), groups, unit: self.unit }
     }
 }

@@ -6,6 +6,7 @@
 use super::histogram::{MOST_RATIO, bin_of};
 use super::labels::{LimbLabels, NOTHING};
 use super::lines::NEARER_BY;
+use super::scan::ScanView;
 use super::{ColorRegions, Posed};
 use crate::association::correspondence::RegionSupport;
 use crate::body::two_bone::TwoBone;
@@ -55,7 +56,7 @@ impl ColorRegions {
         for (picture, labels) in posed.frame.colors.iter().zip(&self.backdrop) {
             let known = self.cameras.get(&picture.number);
             let Some(camera) = known.filter(|camera| camera.known && camera.model.knows(group)) else { continue };
-            let view = camera.view(picture, labels, &self.groups);
+            let view = ScanView { picture, camera, labels, groups: &self.groups };
             let camera_from_limb = camera_from_limb_at(self.stamp, picture, posed)(limb);
             places(shape, &camera_from_limb, picture.camera, |[u, v], depth, area| {
                 all += area;

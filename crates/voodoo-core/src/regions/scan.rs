@@ -1,5 +1,6 @@
 //! Samples images along lines: log ratios of limb and surroundings, and colors to learn.
 
+use super::Learned;
 use super::empty_scene::EmptyScene;
 use super::histogram::{bin_of, clamped};
 use super::labels::{LimbLabels, NOTHING};
@@ -35,11 +36,11 @@ pub(super) struct EdgeSearch {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ScanView<'a> {
     pub picture: &'a ColorImage<'a>,
-    pub model: &'a ColorModel,
+    /// What is known of its camera.
+    pub camera: &'a Learned,
+    /// The limbs that are behind and beside the line.
     pub labels: &'a LimbLabels,
-    pub scene: Option<&'a EmptyScene>,
     pub groups: &'a [u16],
-    pub unit: f32,
 }
 
 /// Result of the search on a line.
@@ -57,7 +58,7 @@ pub(super) fn edge_on(view: &ScanView, line: &Line, search: EdgeSearch, together
     let group = view.group(line.limb);
     // A neighbor outside of the contour may have the same colors as the limb.
     let alike = line.outside != NOTHING && view.group(line.outside) == group;
-    if !line.clear || !view.model.knows(group) || alike {
+    if !line.clear || !view.camera.model.knows(group) || alike {
         return None;
     }
     let EdgeSearch { reach, every } = search;
@@ -110,17 +111,17 @@ impl Local {
 /// Gray values alone hardly identify a whole limb: each ratio is averaged with the log ratio of the local brightness beside the
 /// contour.
 fn compare_locally(view: &ScanView, line: &Line, [start, every]: [f32; 2], ratios: &mut [f32]) {
-    let picture = view.picture;
+    let (picture, unit) = (view.picture, view.camera.unit);
     let side = |from: f32, to: f32| {
         let steps = (to - from).max(0.0) as usize;
-        let walk = Walk::new(picture, line, from * view.unit, view.unit).take(steps);
+        let walk = Walk::new(picture, line, from * unit, unit).take(steps);
         Local::fit(walk.flatten().map(|(column, row)| brightness(picture, column, row)))
     };
     let (inside, outside) = (side(-line.width.min(LOCAL), -1.0), side(1.0, LOCAL));
     if inside.count < 3.0 || outside.count < 3.0 {
         return;
     }
-    let walk = Walk::new(picture, line, start * every * view.unit, every * view.unit);
+    let walk = Walk::new(picture, line, start * every * unit, every * unit);
     for (ratio, pixel) in ratios.iter_mut().zip(walk) {
         if let Some((column, row)) = pixel.filter(|_| *ratio != 0.0) {
             let value = brightness(picture, column, row);
@@ -143,7 +144,8 @@ impl ScanView<'_> {
     fn fill(&self, line: &Line, [start, every]: [f32; 2], ratios: &mut [f32]) {
         let group = self.group(line.limb);
         let mut r = start * every;
-        let walk = Walk::new(self.picture, line, r * self.unit, every * self.unit);
+        let unit = self.camera.unit;
+        let walk = Walk::new(self.picture, line, r * unit, every * unit);
         for (ratio, pixel) in ratios.iter_mut().zip(walk) {
             *ratio = 0.0;
             if let Some((column, row)) = pixel
@@ -162,17 +164,18 @@ impl ScanView<'_> {
     /// Log ratio of a pixel with the given bin, between a group's colors and those of what would be visible without the limb.
     #[inline(always)]
     pub(super) fn ratio(&self, group: usize, other: u16, pixel: usize, bin: usize) -> f32 {
-        let own = self.model.limbs[group].log[bin];
+        let Learned { model, scene, .. } = self.camera;
+        let own = model.limbs[group].log[bin];
         if other == NOTHING {
-            let around = self.model.around[group].log[bin];
+            let around = model.around[group].log[bin];
             let log = |scene: &EmptyScene| scene.log(pixel, self.picture.pixels.get(pixel), around);
-            return clamped(own - self.scene.map_or(around, log));
+            return clamped(own - scene.as_ref().map_or(around, log));
         }
         let other = self.group(other);
-        if other == group || !self.model.limbs[other].known {
+        if other == group || !model.limbs[other].known {
             return 0.0;
         }
-        clamped(own - self.model.limbs[other].log[bin])
+        clamped(own - model.limbs[other].log[bin])
     }
 
     /// What would be visible at `r` units outward without the limb; `None` where something occludes it.

@@ -15,6 +15,7 @@ use crate::fit::{Context, Fit, UNKNOWN_MOTION};
 use crate::math::{Aabb, Pose, Vec3, shifted};
 use crate::observation::candidates::{Candidates, body_box};
 use crate::observation::frame::Ground;
+use crate::observation::observer::Observation;
 use crate::tracker::estimate::Status;
 use detection_check::{DetectionCheck, SIGMAS};
 pub(crate) use detection_check::{DetectionVerdict, Reasons};
@@ -102,7 +103,7 @@ impl Relocalizer {
         self.check.elsewhere = 0.0;
         fit.swap_matches(&mut self.matched);
         self.candidates.gather(context.observation.views, &bounds, context.config);
-        let observation = context.observation.with(&self.candidates);
+        let observation = Observation { candidates: &self.candidates, ..context.observation };
         // Before its first frame the body is where it was set, and what is beside it may be scene.
         let first = context.previous.is_empty();
         let mut fitted = present.to_vec();
@@ -152,7 +153,7 @@ impl Relocalizer {
             self.search.is_body_sized(&context.model.body, segment) && {
                 let bounds = segment.bounds.enlarged(context.config.body_box_margin);
                 self.candidates.gather(views, &bounds, context.config);
-                let observation = context.observation.with(&self.candidates);
+                let observation = Observation { candidates: &self.candidates, ..context.observation };
                 let at = Context { observation, previous: &[], time_scale: UNKNOWN_MOTION, ..context };
                 self.search.try_segment(segment, at, fit, &mut self.trials, present)
             }

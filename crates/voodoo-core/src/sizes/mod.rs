@@ -56,7 +56,7 @@ pub(crate) struct Sizes {
     change: Vec<f64>,
     pull: Vec<f64>,
     /// Lengths reported by detections of an auto-initialized body.
-    reported: ReportedLengths,
+    pub reported: ReportedLengths,
 }
 
 impl Sizes {
@@ -81,11 +81,6 @@ impl Sizes {
         if self.rough {
             self.reported.update(detected);
         }
-    }
-
-    /// Whether the detector reported sizes of an auto-initialized body that are still uncertain.
-    pub(crate) fn is_uncertain(&self, map: &JointMap) -> bool {
-        self.reported.is_uncertain(map)
     }
 
     /// Whether the sizes have yet to be fitted and the pose has to be fitted first.

@@ -10,7 +10,7 @@ const KNOWN: f64 = 0.03;
 
 /// Running estimates of the logarithms of lengths, in the detector's order.
 #[derive(Debug, Default)]
-pub(super) struct ReportedLengths(Vec<LengthEstimate>);
+pub(crate) struct ReportedLengths(Vec<LengthEstimate>);
 
 /// Estimate of the logarithm of one length. Errors of detections of one person are correlated, so all detections together have only
 /// the information of the most precise one.
@@ -45,7 +45,7 @@ impl ReportedLengths {
     }
 
     /// Whether the stature was reported, but with a standard deviation above `KNOWN`.
-    pub(super) fn is_uncertain(&self, map: &JointMap) -> bool {
+    pub(crate) fn is_uncertain(&self, map: &JointMap) -> bool {
         let stature = map.stature.and_then(|stature| self.0.get(stature));
         stature.is_some_and(|stature| stature.information > 0.0 && stature.information < 1.0 / (KNOWN * KNOWN))
     }

@@ -247,7 +247,7 @@ impl BodyTracker {
         }
         let origin = motion.origin;
         let root = origin + motion.expect(&model.body, frame.stamp, config.prediction)[0].translation;
-        let suspect = hypotheses.has_excess() || sizes.is_uncertain(&relocalizer.detector.map);
+        let suspect = hypotheses.has_excess() || sizes.reported.is_uncertain(&relocalizer.detector.map);
         let reasons = Reasons {
             uncertain: suspect || assessor.is_uncertain(&model.extremities),
             anywhere: interrupted,
