@@ -19,8 +19,8 @@ pub(crate) struct Assignment {
 }
 
 impl Assignment {
-    /// Step 2: assigns the candidates to limbs by the limbs' enlarged boxes and the overlap policy; without `buried`, limbs
-    /// inside other limbs get none.
+    /// Step 2: assigns the candidates to limbs by the limbs' enlarged boxes and the overlap policy. Limbs inside other limbs
+    /// get none unless `buried`.
     pub(crate) fn assign(
         &mut self,
         body: &Body,

@@ -37,7 +37,7 @@ pub(crate) struct NearestLimb {
 }
 
 impl NearestLimb {
-    /// Sets the limb poses, with the boxes enlarged by `margin`. Without `buried`, limbs inside other limbs contain no point.
+    /// Sets the limb poses, with the boxes enlarged by `margin`. Limbs inside other limbs contain no point unless `buried`.
     pub(crate) fn place(&mut self, body: &Body, poses: &[Pose], margin: f64, buried: bool) {
         let limbs = || body.limbs().iter().zip(poses);
         refill(&mut self.limbs, limbs().map(|(limb, pose)| LimbBox::new(limb, pose, margin)));

@@ -111,8 +111,8 @@ impl Backgrounds {
         }
     }
 
-    /// Sets the learned depth to unknown at pixels, of the image with this index, that show a person. Depths learned behind the person stay: without them, the
-    /// background would look like a flat body once the person is gone.
+    /// Sets the learned depth to unknown at pixels, of the image with this index, that show a person. Depths learned behind the person
+    /// stay: without them, the background would look like a flat body once the person is gone.
     pub(crate) fn release(&mut self, frame: &Frame, image: usize, pixels: &[usize]) {
         let Some(image) = frame.images.get(image) else { return };
         let Some(known) = self.of_image_mut(image) else { return };

@@ -5,8 +5,7 @@ use super::scan::LineEdge;
 use crate::body::Body;
 use crate::camera::{Camera, NEAREST_RETURN};
 use crate::math::{Pose, Vec3};
-use crate::observation::frame::{DepthImage, Frame};
-use crate::observation::picture::ColorImage;
+use crate::observation::frame::DepthImage;
 
 /// Points on the rim of a free end.
 const RIM: usize = 8;
@@ -45,7 +44,7 @@ pub(super) struct Line {
 }
 
 /// A depth camera within this distance of another camera has the same view, meters.
-const SAME_VIEW: f64 = 0.15;
+pub(super) const SAME_VIEW: f64 = 0.15;
 /// A measurement nearer than a limb by more than this occludes it, meters: the limbs may not have converged yet.
 const BEFORE_BY: f64 = 0.15;
 
@@ -59,12 +58,6 @@ pub(super) struct Viewer<'a> {
     pub world_from_camera: Pose,
     /// The image of a depth camera beside the camera, if the frame has one: it measures what occludes the body.
     pub depth: Option<&'a DepthImage<'a>>,
-}
-
-/// The image of the depth camera beside the camera of a picture, if the frame has one.
-pub(super) fn depth_beside<'a>(frame: &Frame<'a>, picture: &ColorImage) -> Option<&'a DepthImage<'a>> {
-    let place = picture.world_from_sensor.translation;
-    frame.images.iter().find(|image| image.world_from_sensor.translation.distance(place) < SAME_VIEW)
 }
 
 impl Viewer<'_> {

@@ -10,7 +10,6 @@ mod evidence;
 mod histogram;
 mod labels;
 mod lines;
-mod models;
 mod pixel_gain;
 mod posterior;
 mod scan;
@@ -24,10 +23,9 @@ use crate::observation::frame::Frame;
 use crate::observation::picture::{ColorImage, ColorPixels};
 use empty_scene::EmptyScene;
 use evidence::Evidence;
-use histogram::Kind;
+use histogram::{ColorModel, Kind};
 use labels::LimbLabels;
-use lines::{Line, Viewer, depth_beside};
-use models::ColorModel;
+use lines::{Line, SAME_VIEW, Viewer};
 use pixel_gain::camera_from_limb_at;
 use scan::{EdgeSearch, ScanView};
 use std::collections::BTreeMap;
@@ -294,7 +292,8 @@ impl ColorRegions {
         // Reserves the full capacity at once: the number of lines differs from pose to pose.
         lines.reserve(2 * MOST_LINES * camera_from_limb.len());
         let (camera, world_from_camera) = (picture.camera, picture.world_from_sensor);
-        let depth = depth_beside(posed.frame, picture);
+        let beside = |pose: &Pose| pose.translation.distance(world_from_camera.translation) < SAME_VIEW;
+        let depth = posed.frame.images.iter().find(|image| beside(&image.world_from_sensor));
         let viewer = Viewer { body, camera, labels, unit: *unit, world_from_camera, depth };
         for (limb, pose) in camera_from_limb.iter().enumerate() {
             let lines_a_side = (body.limbs()[limb].shape.length() / SPACING).round() as usize;

@@ -6,9 +6,11 @@ const TEMPERATURE: f32 = 8.0;
 pub(super) const MOST_REACH: usize = 10;
 
 /// Estimates the edge within `reach` samples of the middle: returns the mean of its posterior, in units outward from the expected
-/// edge, and its information: one over the variance of the posterior, minus the information of the search bounds alone. `near` are the log ratios halfway between the integer positions from
-/// `-reach` to `reach`. If the opposite contour of the limb is visible too, `far` are the log ratios there; otherwise the limb
-/// continues. Samples between the two ranges belong to the limb for any displacement. A sample represents `every` units.
+/// edge, and its information: one over the variance of the posterior, minus the information of the search bounds alone.
+///
+/// `near` are the log ratios halfway between the integer positions from `-reach` to `reach`. If the opposite contour of the limb is
+/// visible too, `far` are the log ratios there; otherwise the limb continues. Samples between the two ranges belong to the limb for
+/// any displacement. A sample represents `every` units.
 pub(super) fn edge(near: &[f32], far: Option<&[f32]>, reach: usize, every: f32) -> [f32; 2] {
     let count = 2 * reach + 1;
     let mut sums = [0.0_f32; 2 * MOST_REACH + 1];

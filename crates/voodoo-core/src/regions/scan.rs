@@ -2,10 +2,9 @@
 
 use super::Learned;
 use super::empty_scene::EmptyScene;
-use super::histogram::{bin_of, clamped};
+use super::histogram::{ColorModel, bin_of, clamped};
 use super::labels::{LimbLabels, NOTHING};
 use super::lines::{BESIDE, Line, NEARER_BY};
-use super::models::ColorModel;
 use super::posterior::{MOST_REACH, edge};
 use crate::camera::Camera;
 use crate::observation::picture::{ColorImage, ColorPixels};
