@@ -54,7 +54,7 @@ impl Room {
     fn frame(&mut self) {
         let images = [CAMERA.image(&self.images[self.frames % PERIOD])];
         self.frames += 1;
-        let frame = Frame::empty(self.frames as f64 / RATE).with_images(&images);
+        let frame = Frame { images: &images, ..Frame::empty(self.frames as f64 / RATE) };
         black_box(&mut self.people).step(&frame, &[]).unwrap();
     }
 }

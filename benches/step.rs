@@ -34,7 +34,7 @@ impl Bench<'_> {
         let (clouds, images) = self.instants[self.frames % 2];
         self.frames += 1;
         // As often as a camera measures: a detector looks by time.
-        let frame = Frame::empty(self.frames as f64 / 30.0).with_clouds(clouds).with_images(images);
+        let frame = Frame { clouds, images, ..Frame::empty(self.frames as f64 / 30.0) };
         black_box(self.tracker.step(&frame).unwrap()).steps
     }
 

@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let position = body.site_position(&standing, body.site_index(site)?) + up;
             positions.push(measurement(&body, &Reading { site, position, sigma: 0.02 })?);
         }
-        let estimate = tracker.step(&Frame::empty(f64::from(index) / 30.0).with_positions(&positions))?;
+        let estimate = tracker.step(&Frame { positions: &positions, ..Frame::empty(f64::from(index) / 30.0) })?;
         for (site, measured) in wrists.iter().zip(&positions) {
             let error = estimate.sites[measured.site].distance(measured.position);
             println!("{:.3} s: {site} {:.1} mm from its tag", estimate.stamp, 1000.0 * error);

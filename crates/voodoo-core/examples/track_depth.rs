@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             weight: 1.0,
             source: 0,
         };
-        let estimate: &Estimate = tracker.step(&Frame::empty(f64::from(index) / 30.0).with_images(&[image]))?;
+        let estimate: &Estimate = tracker.step(&Frame { images: &[image], ..Frame::empty(f64::from(index) / 30.0) })?;
         let error = estimate.sites[root].distance(body.site_position(&truth, root));
         println!(
             "{:.3} s: {}, root at {:.3}, {:.1} mm off",

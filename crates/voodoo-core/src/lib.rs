@@ -45,7 +45,7 @@
 //!
 //! let mut tracker = Tracker::new(body, Config::default())?;
 //! tracker.reset(&start, true)?;
-//! let estimate = tracker.step(&Frame::empty(0.0).with_clouds(&[cloud]))?;
+//! let estimate = tracker.step(&Frame { clouds: &[cloud], ..Frame::empty(0.0) })?;
 //! assert_eq!(estimate.status, Status::Tracking);
 //! assert!(estimate.mean_squared_distance.sqrt() < 0.01);
 //! # Ok(())
@@ -107,10 +107,8 @@
 //!     source: 0,
 //! };
 //! let wrist = PositionRelation { site: 0, position: Vec3::new(0.1, 0.2, 1.5), weight: 20.0, bias: 0.0, source: 1 };
-//! let frame = Frame::empty(0.0)
-//!     .with_images(std::slice::from_ref(&image))
-//!     .with_positions(std::slice::from_ref(&wrist))
-//!     .with_ground(Ground { normal: -Vec3::Y, offset: -1.2 });
+//! let ground = Some(Ground { normal: -Vec3::Y, offset: -1.2 });
+//! let frame = Frame { images: &[image], positions: &[wrist], ground, ..Frame::empty(0.0) };
 //! assert_eq!(frame.images.len(), 1);
 //! # Ok(())
 //! # }

@@ -76,7 +76,7 @@ pub(crate) fn with_frame<R>(pixels: &[u16], stamp: f64, check: impl FnOnce(&Fram
 
 /// A mask of a scene in which nobody else is.
 pub(crate) fn everything(scene: &Backgrounds) -> OwnershipMask<'_> {
-    OwnershipMask { owners: &[], cloud_owners: &[], own: 0, others: 0, scene }
+    OwnershipMask { owners: &[], own: 0, others: 0, scene }
 }
 
 /// The scene of a frame in which the wall is known.
@@ -88,9 +88,9 @@ pub(crate) fn wall(frame: &Frame) -> Backgrounds {
 
 /// Learns the depths of a frame for which `is_scene` holds.
 pub(crate) fn learn(scene: &mut Backgrounds, frame: &Frame, is_scene: impl Fn(f32) -> bool) {
-    scene.register(frame, |_, _| {});
+    scene.register(frame);
     for image in frame.images {
-        for (index, depth) in scene.depth_mut(image).unwrap().iter_mut().enumerate() {
+        for (index, depth) in scene.of_image_mut(image).unwrap().depth.iter_mut().enumerate() {
             *depth =
                 Some(image.pixels.get(index) * image.meters_per_unit as f32).filter(|z| is_scene(*z)).unwrap_or(0.0);
         }
@@ -120,7 +120,7 @@ pub(crate) fn with_setting<R>(
         let mut observer = Observer::default();
         let scene = if config.background { wall(frame) } else { Backgrounds::default() };
         let bounds = body_box(&model.body, poses, config.body_box_margin);
-        observer.begin(frame, everything(&scene));
+        observer.begin(frame, everything(&scene), None);
         let observation = observer.gather(frame, Vec3::ZERO, &bounds, everything(&scene), config);
         check(Setting { config, observation, previous: poses, time_scale: 1.0 })
     })

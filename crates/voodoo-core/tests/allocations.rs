@@ -41,11 +41,13 @@ fn allocations(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> usize {
     for index in 0..WARM_UP + COUNTED {
         let (pixels, points) = &frames[index % frames.len()];
         let (images, clouds) = ([camera.image(pixels)], [scene::cloud(points)]);
-        let frame = Frame::empty(index as f64)
-            .with_clouds(&clouds)
-            .with_images(&images)
-            .with_positions(&positions)
-            .with_rays(&rays);
+        let frame = Frame {
+            clouds: &clouds,
+            images: &images,
+            positions: &positions,
+            rays: &rays,
+            ..Frame::empty(index as f64)
+        };
         let before = allocations_so_far();
         tracker.step(&frame).unwrap();
         if index >= WARM_UP {
@@ -85,7 +87,7 @@ fn region_allocations(cameras: usize) -> usize {
         let stamp = index as f64;
         let colors = [0, 1, 2, 3].map(|camera| color_scene::picture(&pictures[index % 2][camera], camera, stamp));
         let before = allocations_so_far();
-        tracker.step(&Frame::empty(stamp).with_colors(&colors[..cameras])).unwrap();
+        tracker.step(&Frame { colors: &colors[..cameras], ..Frame::empty(stamp) }).unwrap();
         if index >= WARM_UP / 2 {
             count += allocations_so_far() - before;
         }

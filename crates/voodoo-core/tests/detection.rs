@@ -79,7 +79,7 @@ fn farthest(tracker: &Tracker, body: &Body, poses: &[Pose]) -> f64 {
 fn feed(tracker: &mut Tracker, pixels: &[u16], frames: std::ops::Range<i32>) {
     let images = [CAMERA.image(pixels)];
     for frame in frames {
-        tracker.step(&Frame::empty(f64::from(frame) / 30.0).with_images(&images)).unwrap();
+        tracker.step(&Frame { images: &images, ..Frame::empty(f64::from(frame) / 30.0) }).unwrap();
     }
 }
 
@@ -198,7 +198,7 @@ fn a_detector_that_fails_leaves_the_step_as_it_would_be_without_detections_and_r
         let mut bits = Vec::new();
         let mut errors = Vec::new();
         for frame in 0..4 {
-            tracker.step(&Frame::empty(f64::from(frame)).with_images(&images)).unwrap();
+            tracker.step(&Frame { images: &images, ..Frame::empty(f64::from(frame)) }).unwrap();
             bits.push(scene::bits(tracker.estimate()));
             errors.push(tracker.detector_error().map(ToString::to_string));
         }
@@ -228,7 +228,7 @@ fn what_cannot_be_meant_is_a_failure_that_names_it() {
         }),
         ("detection[0].lengths: expected 0", |observed| observed.lengths = vec![[1.0, 0.1]]),
         ("detection[0].person and facing", |observed| observed.person = f64::NAN),
-        ("detection[0].low and high", |observed| observed.high = Vec3::INFINITY),
+        ("detection[0].bounds", |observed| observed.bounds.maxs = Vec3::INFINITY),
         ("detection[0].pixels: expected indices below 19840", |observed| observed.pixels = vec![usize::MAX]),
     ];
     for (words, wrong) in wrongs {
@@ -257,7 +257,7 @@ fn several_persons_are_found_by_any_detector_and_without_one_who_is_added_is_fol
     let images = [CAMERA.image(&pixels)];
     let step = |people: &mut People, frames: i32| {
         for frame in 0..frames {
-            people.step(&Frame::empty(f64::from(frame) / 15.0).with_images(&images), &[]).unwrap();
+            people.step(&Frame { images: &images, ..Frame::empty(f64::from(frame) / 15.0) }, &[]).unwrap();
         }
     };
     let roots = |people: &People| -> Vec<Vec3> {

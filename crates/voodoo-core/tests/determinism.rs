@@ -14,7 +14,7 @@ fn run(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> Vec<Vec<u64>> {
     tracker.reset_pose(&scene::standing(&body)).unwrap();
     let step = |(index, (pixels, points)): (usize, &(Vec<u16>, Vec<[f64; 3]>))| {
         let (images, clouds) = ([camera.image(pixels)], [scene::cloud(points)]);
-        let frame = Frame::empty(index as f64).with_clouds(&clouds).with_images(&images);
+        let frame = Frame { clouds: &clouds, images: &images, ..Frame::empty(index as f64) };
         let estimate = tracker.step(&frame).unwrap();
         assert!(estimate.limb_points.iter().sum::<usize>() > 1000, "the frame is not seen at all");
         scene::bits(estimate)

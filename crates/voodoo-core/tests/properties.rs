@@ -188,7 +188,7 @@ proptest! {
         let ray = [RayRelation { site, origin, direction, weight: 1.0, bias: 0.0, source: 0 }];
         let mut tracker = tracker(settled(), &poses);
         for stamp in 0..10 {
-            tracker.step(&Frame::empty(f64::from(stamp)).with_rays(&ray)).unwrap();
+            tracker.step(&Frame { rays: &ray, ..Frame::empty(f64::from(stamp)) }).unwrap();
         }
         let found = tracker.estimate().sites[site] - origin;
         prop_assert!(found.reject_from(direction).length() < 1e-3, "{} m off", found.reject_from(direction).length());
@@ -203,7 +203,7 @@ proptest! {
         let relation = [PositionRelation { site, position, weight: 1.0, bias: 0.0, source: 0 }];
         let mut tracker = tracker(settled(), &poses);
         for stamp in 0..10 {
-            tracker.step(&Frame::empty(f64::from(stamp)).with_positions(&relation)).unwrap();
+            tracker.step(&Frame { positions: &relation, ..Frame::empty(f64::from(stamp)) }).unwrap();
         }
         prop_assert!((tracker.estimate().sites[site] - position).length() < 1e-3);
         prop_assert!(tracker.estimate().joint_gaps.iter().all(|gap| *gap < 2e-3));
@@ -218,7 +218,7 @@ proptest! {
         // Where on the line the ray starts does not matter, as long as the site is before it.
         let ray = [RayRelation { site, origin: target - direction * (2.0 + along), direction, weight: 5.0, bias: 0.0, source: 0 }];
         let mut tracker = tracker(settled(), &poses);
-        tracker.step(&Frame::empty(0.0).with_rays(&ray)).unwrap();
+        tracker.step(&Frame { rays: &ray, ..Frame::empty(0.0) }).unwrap();
         prop_assert!(largest_distance(&tracker.estimate().sites, &sites(&human(), &poses)) < 1e-6);
     }
 
@@ -272,7 +272,7 @@ proptest! {
             let position = sites(&human(), &before)[site] + Vec3::Y * 0.02;
             let positions = [PositionRelation { site, position, weight: 20.0 * factor, bias: 0.0, source: 1 }];
             let mut tracker = tracker(scene::with(settled(), |config| config.max_steps = 6), &before);
-            tracker.step(&Frame::empty(0.0).with_clouds(&cloud).with_positions(&positions)).unwrap().sites.clone()
+            tracker.step(&Frame { clouds: &cloud, positions: &positions, ..Frame::empty(0.0) }).unwrap().sites.clone()
         };
         prop_assert!(largest_distance(&run(1.0), &run(factor)) < 1e-5);
     }

@@ -92,7 +92,7 @@ fn bad_images_are_refused() {
             "depth[0].world_from_sensor",
         ),
     ] {
-        refused(&Frame::empty(2.0).with_images(&[image]), what);
+        refused(&Frame { images: &[image], ..Frame::empty(2.0) }, what);
     }
 }
 
@@ -105,13 +105,13 @@ fn bad_sites_and_floors_are_refused() {
         (PositionRelation { position: Vec3::NAN, ..position }, "positions[0].position"),
         (PositionRelation { weight: f64::NAN, ..position }, "positions[0].weight"),
     ] {
-        refused(&Frame::empty(2.0).with_positions(&[bad]), what);
+        refused(&Frame { positions: &[bad], ..Frame::empty(2.0) }, what);
         let detection = DetectedPerson { positions: &[position, bad], person: 5.0 };
         let what = what.replace("positions[0]", "detections[0].positions[1]");
-        refused(&Frame::empty(2.0).with_detections(&[detection]), &what);
+        refused(&Frame { detections: &[detection], ..Frame::empty(2.0) }, &what);
     }
     let nobody = DetectedPerson { positions: &[position], person: f64::NAN };
-    refused(&Frame::empty(2.0).with_detections(&[nobody]), "detections[0].person");
+    refused(&Frame { detections: &[nobody], ..Frame::empty(2.0) }, "detections[0].person");
     let ray = RayRelation { site: 0, origin: Vec3::ZERO, direction: Vec3::X, weight: 1.0, bias: 0.0, source: 0 };
     for (bad, what) in [
         (RayRelation { site: sites, ..ray }, "rays[0].site"),
@@ -120,10 +120,10 @@ fn bad_sites_and_floors_are_refused() {
         (RayRelation { direction: Vec3::NAN, ..ray }, "rays[0].direction"),
         (RayRelation { weight: 0.0, bias: 0.0, ..ray }, "rays[0].weight"),
     ] {
-        refused(&Frame::empty(2.0).with_rays(&[bad]), what);
+        refused(&Frame { rays: &[bad], ..Frame::empty(2.0) }, what);
     }
     for (normal, offset) in [(Vec3::Z * 2.0, 0.0), (Vec3::NAN, 0.0), (Vec3::Z, f64::NAN)] {
-        refused(&Frame::empty(2.0).with_ground(Ground { normal, offset }), "ground");
+        refused(&Frame { ground: Some(Ground { normal, offset }), ..Frame::empty(2.0) }, "ground");
     }
 }
 

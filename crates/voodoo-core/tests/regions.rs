@@ -68,7 +68,7 @@ fn followed(config: Config, late: [f64; CAMERAS], stamped: bool, gray: bool) -> 
                 if gray { ColorImage { pixels: ColorPixels::Gray(&grays[camera]), ..image } } else { image }
             })
             .collect();
-        tracker.step(&Frame::empty(stamp).with_colors(&colors)).unwrap();
+        tracker.step(&Frame { colors: &colors, ..Frame::empty(stamp) }).unwrap();
     }
     tracker.estimate().clone()
 }
@@ -112,7 +112,7 @@ fn a_body_that_is_not_in_the_pictures_is_not_tracked() {
         let pictures_now = if frame < 4 { &observed } else { &empty };
         let colors: Vec<ColorImage> =
             (0..CAMERAS).map(|camera| picture(&pictures_now[camera], camera, stamp)).collect();
-        let status = tracker.step(&Frame::empty(stamp).with_colors(&colors)).unwrap().status;
+        let status = tracker.step(&Frame { colors: &colors, ..Frame::empty(stamp) }).unwrap().status;
         assert!(frame >= 4 || status == Status::Tracking, "{status:?} in frame {frame}");
     }
     assert_eq!(tracker.estimate().status, Status::Lost);
@@ -141,7 +141,7 @@ fn after_a_swing(config: Config, limbs: [&str; 3], turn: Quat, frames: usize) ->
         let stamp = frame as f64 / RATE;
         let shot = &shots[usize::from(frame >= 4)];
         let colors: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&shot[camera], camera, stamp)).collect();
-        tracker.step(&Frame::empty(stamp).with_colors(&colors)).unwrap();
+        tracker.step(&Frame { colors: &colors, ..Frame::empty(stamp) }).unwrap();
     }
     let end = body.limb_index(limbs[1]).unwrap();
     let place = Vec3::Z * body.limbs()[end].shape.length();
@@ -175,7 +175,7 @@ fn edges_beside_depth(body: &Body, before_arm: bool) -> usize {
     let mut tracker = Tracker::new(body.clone(), Config::default()).unwrap();
     tracker.reset_pose(&poses).unwrap();
     let (colors, images) = ([picture(&pixels, 0, 0.0)], [depth_picture(&depth, 0)]);
-    tracker.step(&Frame::empty(0.0).with_colors(&colors).with_images(&images)).unwrap();
+    tracker.step(&Frame { colors: &colors, images: &images, ..Frame::empty(0.0) }).unwrap();
     tracker.region_lines(0).filter(|line| arm.contains(&line.limb) && line.sigma.is_finite()).count()
 }
 
@@ -199,12 +199,12 @@ fn what_cannot_be_used_is_refused_and_changes_nothing() {
     let mut tracker = started(&body, Config::default());
     let observed = pictures(&body, |_| 0.0);
     let good: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&observed[camera], camera, 0.0)).collect();
-    tracker.step(&Frame::empty(0.0).with_colors(&good)).unwrap();
+    tracker.step(&Frame { colors: &good, ..Frame::empty(0.0) }).unwrap();
     let small = [[0_u8; 3]; 6];
     tracker.set_background(0, &[(ColorPixels::Color(&small), [2, 3])]).unwrap();
     let before = format!("{tracker:?}");
     let refused = |tracker: &mut Tracker, pictures: &[ColorImage]| {
-        tracker.step(&Frame::empty(0.1).with_colors(pictures)).unwrap_err().to_string()
+        tracker.step(&Frame { colors: pictures, ..Frame::empty(0.1) }).unwrap_err().to_string()
     };
     let at = |camera: usize, stamp: f64| picture(&observed[camera], camera, stamp);
     assert!(refused(&mut tracker, &[at(0, 0.1)]).contains("color[0].image: expected a picture like those"));
@@ -217,7 +217,7 @@ fn what_cannot_be_used_is_refused_and_changes_nothing() {
     assert_eq!(format!("{tracker:?}"), before);
     tracker.set_background(0, &[]).unwrap();
     let next: Vec<ColorImage> = (0..CAMERAS).map(|camera| at(camera, 0.1)).collect();
-    assert!(tracker.step(&Frame::empty(0.1).with_colors(&next)).is_ok());
+    assert!(tracker.step(&Frame { colors: &next, ..Frame::empty(0.1) }).is_ok());
 }
 
 #[test]
@@ -245,7 +245,7 @@ fn pictures_of_the_empty_scene_help_where_clothes_are_as_the_room() {
             all.iter_mut().zip(&rooms).for_each(|(pixels, room)| dye(pixels, room));
             let stamp = frame as f64 / RATE;
             let colors: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&all[camera], camera, stamp)).collect();
-            tracker.step(&Frame::empty(stamp).with_colors(&colors)).unwrap();
+            tracker.step(&Frame { colors: &colors, ..Frame::empty(stamp) }).unwrap();
         }
         off(&body, tracker.estimate(), (FRAMES - 1) as f64).1
     });

@@ -32,7 +32,7 @@ fn cover_and_move(config: Config) -> (Body, Vec<Estimate>) {
             pixels.fill(0);
         }
         let images = [CAMERA.image(&pixels)];
-        let frame = Frame::empty(f64::from(index) / 30.0).with_images(&images);
+        let frame = Frame { images: &images, ..Frame::empty(f64::from(index) / 30.0) };
         found.push(tracker.step(&frame).unwrap().clone());
     }
     (body, found)
@@ -86,7 +86,7 @@ fn sizes_of_a_second_reset_start_from_the_body_as_given() {
         (0..body.sites().len()).map(|site| (site, body.site_position(&poses, site))).collect();
     let (pixels, _) = CAMERA.shoot(&thick, &poses, 0.005, &mut noise);
     let images = [CAMERA.image(&pixels)];
-    let frame = Frame::empty(0.0).with_images(&images);
+    let frame = Frame { images: &images, ..Frame::empty(0.0) };
     let mut tracker = crate::tracker(body.clone(), Config::default()).unwrap();
     tracker.reset(&positions, true).unwrap();
     let given = tracker.body().clone();

@@ -178,7 +178,7 @@ impl Detect for Detector {
             let Some(mut detection) = evaluate(enlargement(stature.map(|[stature, _]| stature))) else { continue };
             evaluations += 1;
             if nearest.is_none() {
-                *nearest = Some((detection.person, Aabb::new(detection.low, detection.high)));
+                *nearest = Some((detection.person, detection.bounds));
             }
             if detection.person > PERSON {
                 let enlarged = enlargement(detection.lengths.last().map(|[length, _]| *length));
@@ -296,8 +296,7 @@ fn detection(answer: &Answer, crop: &Crop, candidate: &PersonCandidate, world_fr
         lengths: answer.log_lengths.iter().zip(&answer.log_length_scale).map(length).collect(),
         facing: Some(f64::from(answer.facing)),
         person: f64::from(answer.person),
-        low: bounds.mins,
-        high: bounds.maxs,
+        bounds,
         ..Detection::default()
     }
 }

@@ -57,7 +57,7 @@ fn people(options: PeopleOptions, threads: usize) -> People {
 
 fn feed(people: &mut People, pixels: &[u16], frame: usize) -> Vec<(usize, Status, Vec3)> {
     let images = [CAMERA.image(pixels)];
-    let input = Frame::empty(frame as f64 / RATE).with_images(&images);
+    let input = Frame { images: &images, ..Frame::empty(frame as f64 / RATE) };
     people.step(&input, &[]).unwrap();
     let place = |tracker: &voodoo_core::BodyTracker| tracker.estimate().world_from_limb[0].translation;
     people.present().map(|(id, tracker)| (id, tracker.estimate().status, place(tracker))).collect()
@@ -122,10 +122,10 @@ fn a_refused_frame_changes_nothing() {
     }
     let before = format!("{people:?}");
     let (pictures, none) = ([CAMERA.image(&images[6])], [CAMERA.image(&[])]);
-    let good = Frame::empty(1.0).with_images(&pictures);
-    assert!(people.step(&Frame::empty(0.1).with_images(&pictures), &[]).is_err(), "time ran backwards");
-    assert!(people.step(&Frame::empty(1.0).with_images(&none), &[]).is_err(), "no pixels");
-    assert!(people.step(&good, &[(1, Frame::empty(1.0).with_images(&none))]).is_err(), "one person's");
+    let good = Frame { images: &pictures, ..Frame::empty(1.0) };
+    assert!(people.step(&Frame { images: &pictures, ..Frame::empty(0.1) }, &[]).is_err(), "time ran backwards");
+    assert!(people.step(&Frame { images: &none, ..Frame::empty(1.0) }, &[]).is_err(), "no pixels");
+    assert!(people.step(&good, &[(1, Frame { images: &none, ..Frame::empty(1.0) })]).is_err(), "one person's");
     let short = [[0_u8; 3]; 5];
     let picture = ColorImage {
         pixels: ColorPixels::Color(&short),
@@ -135,7 +135,7 @@ fn a_refused_frame_changes_nothing() {
         number: 0,
         source: 0,
     };
-    assert!(people.step(&good.with_colors(&[picture]), &[]).is_err(), "a pixel is missing");
+    assert!(people.step(&Frame { colors: &[picture], ..good }, &[]).is_err(), "a pixel is missing");
     assert_eq!(format!("{people:?}"), before);
     assert!(people.step(&good, &[]).is_ok());
 }

@@ -44,7 +44,7 @@ fn a_person_is_found_without_a_start_and_so_are_joints_lengths_and_pixels() {
     let mut tracker = crate::tracker(body.clone(), Config::default()).unwrap();
     let images = [image];
     for frame in 0..10 {
-        tracker.step(&Frame::empty(f64::from(frame) / 30.0).with_images(&images)).unwrap();
+        tracker.step(&Frame { images: &images, ..Frame::empty(f64::from(frame) / 30.0) }).unwrap();
     }
     assert_eq!(tracker.estimate().status, Status::Tracking);
     let site = body.site_index("humanoid_root").unwrap();

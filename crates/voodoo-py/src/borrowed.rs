@@ -117,15 +117,17 @@ impl<'py, 'a> Borrowed<'py, 'a> {
         let detections = self.detections.iter();
         let detections: Vec<_> =
             detections.map(|(positions, person)| DetectedPerson { positions, person: *person }).collect();
-        let frame = Frame::empty(self.held.stamp)
-            .with_clouds(&clouds)
-            .with_images(&images)
-            .with_colors(&colors)
-            .with_positions(&self.positions)
-            .with_rays(&self.rays)
-            .with_detections(&detections)
-            .with_ground(self.held.ground)
-            .with_excluded(&self.held.excluded);
+        let frame = Frame {
+            stamp: self.held.stamp,
+            clouds: &clouds,
+            images: &images,
+            colors: &colors,
+            positions: &self.positions,
+            rays: &self.rays,
+            detections: &detections,
+            ground: self.held.ground,
+            excluded: &self.held.excluded,
+        };
         then(&frame)
     }
 }

@@ -52,7 +52,7 @@ impl PyDetector {
         let views = frame.depth_views(py)?;
         let images = depth_images(&views)?;
         let input =
-            Frame::empty(frame.stamp).with_images(&images).with_ground(frame.ground).with_excluded(&frame.excluded);
+            Frame { images: &images, ground: frame.ground, excluded: &frame.excluded, ..Frame::empty(frame.stamp) };
         input.check(&any, None).map_err(raise)?;
         let direction = |up: &Bound<'_, PyAny>| {
             let wrong = || wrong_argument("up", "a vector that is not zero", up);

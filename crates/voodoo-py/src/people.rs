@@ -92,8 +92,8 @@ impl PyPeople {
         let cameras: Vec<u16> = (0..).take(frame.colors.len()).collect();
         let clouds = owned.iter().map(Borrowed::clouds).collect::<PyResult<Vec<_>>>()?;
         let measured = own.iter().zip(&owned).zip(&clouds).map(|(((id, frame), own), clouds)| {
-            let frame = Frame::empty(frame.stamp).with_clouds(clouds);
-            (*id, frame.with_positions(&own.positions).with_rays(&own.rays))
+            let (positions, rays) = (own.positions.as_slice(), own.rays.as_slice());
+            (*id, Frame { clouds, positions, rays, ..Frame::empty(frame.stamp) })
         });
         let measured: Vec<(usize, Frame)> = measured.collect();
         let people = &mut self.people;

@@ -75,7 +75,7 @@ impl PyTracker {
         let poses = poses.map(|poses| limb_poses(self.tracker.body(), &poses)).transpose()?;
         let (cameras, views) = (self.cameras_of(frame)?, frame.color_views(py)?);
         let colors = color_images(&views, &cameras)?;
-        let input = Frame::empty(frame.stamp).with_colors(&colors);
+        let input = Frame { colors: &colors, ..Frame::empty(frame.stamp) };
         let tracker = &mut self.tracker;
         py.detach(|| question(tracker, &input, poses.as_deref())).map_err(raise)
     }

@@ -16,12 +16,11 @@ pub(crate) struct Assignment {
     search: NearestLimb,
     /// The nearest limb of each candidate.
     nearest: Vec<u32>,
-    /// For each candidate, which limbs' boxes contain it; only filled when the overlap policy needs it.
-    inside: Vec<bool>,
 }
 
 impl Assignment {
-    /// Step 2: assigns the candidates to limbs by the limbs' enlarged boxes and the overlap policy; `buried` limbs get none.
+    /// Step 2: assigns the candidates to limbs by the limbs' enlarged boxes and the overlap policy. Limbs inside other limbs
+    /// get none unless `buried`.
     pub(crate) fn assign(
         &mut self,
         body: &Body,
@@ -29,9 +28,9 @@ impl Assignment {
         candidates: &Candidates,
         overlap: Overlap,
         box_margin: f64,
-        buried: &[bool],
+        buried: bool,
     ) {
-        let Self { members, search, nearest, inside } = self;
+        let Self { members, search, nearest } = self;
         // One more list for the candidates outside all boxes.
         members.resize_with(poses.len() + 1, Vec::new);
         for limb in members.iter_mut() {
@@ -40,9 +39,8 @@ impl Assignment {
             limb.reserve(candidates.len());
         }
         nearest.resize(candidates.len(), NONE);
-        inside.resize(if overlap == Overlap::Exclusive { 0 } else { candidates.len() * poses.len() }, false);
         search.place(body, poses, box_margin, buried);
-        search.find(&candidates.clusters, nearest, inside);
+        search.find(&candidates.clusters, nearest);
         if overlap == Overlap::Exclusive {
             let count = candidates.len();
             let (nearest, known) = (&nearest[..count], &candidates.limb[..count]);
@@ -63,11 +61,10 @@ impl Assignment {
         }
         for (index, (nearest, known)) in (0..).zip(nearest.iter().zip(&candidates.limb)) {
             match *known {
-                ANY_LIMB if *nearest == NONE => {}
                 ANY_LIMB => {
-                    let inside = &inside[index as usize * poses.len()..][..poses.len()];
-                    for (limb, _) in inside.iter().enumerate().filter(|(_, inside)| **inside) {
-                        let nearest = *nearest as usize;
+                    let (place, nearest) = (index as usize, *nearest as usize);
+                    let Points { x, y, z } = &candidates.points;
+                    for limb in search.around([x[place], y[place], z[place]]) {
                         if overlap == Overlap::Shared || limb == nearest || body.adjacent(limb, nearest) {
                             members[limb].push(index);
                         }
@@ -189,7 +186,7 @@ mod tests {
     fn holders(overlap: Overlap) -> (Body, Vec<Pose>, Candidates, Vec<Vec<usize>>) {
         let (body, poses, candidates) = scene();
         let mut assignment = Assignment::default();
-        assignment.assign(&body, &poses, &candidates, overlap, MARGIN, &[]);
+        assignment.assign(&body, &poses, &candidates, overlap, MARGIN, true);
         let mut holders = vec![Vec::new(); candidates.len()];
         for (limb, members) in assignment.members[..poses.len()].iter().enumerate() {
             assert!(members.is_sorted_by(|a, b| a < b), "ascending, none twice");

@@ -4,42 +4,25 @@
 //! would hold it there.
 
 use crate::body::Body;
-use crate::math::{Pose, Vec3, refill};
+use crate::math::{Pose, Vec3};
 use crate::visibility::ALONG_LIMB;
 
 /// A position this deep in another limb counts as inside it, meters: limbs are soft, and thinner or thicker than their models.
 const DEEP: f64 = 0.03;
 
-/// Which limbs of a body lie inside other limbs.
-#[derive(Debug, Default)]
-pub(crate) struct Buried {
-    limbs: Vec<bool>,
-    /// Bounding sphere of each limb.
-    spheres: Vec<(Vec3, f64)>,
-}
-
-impl Buried {
-    /// Finds the limbs that have most of their axis inside other limbs. Limbs that are joined, or have the same parent, are not
-    /// tested against each other: they overlap in any pose.
-    pub(crate) fn find(&mut self, body: &Body, poses: &[Pose]) -> &[bool] {
-        let Self { limbs, spheres } = self;
-        let parts = body.limbs();
-        refill(spheres, parts.iter().zip(poses).map(|(limb, pose)| limb.shape.sphere(pose)));
-        let is_buried = |limb: usize| {
-            let inside = |fraction: &&f64| {
-                let place = poses[limb] * (**fraction * parts[limb].shape.length() * Vec3::Z);
-                (0..poses.len()).any(|other| {
-                    let (middle, reach) = spheres[other];
-                    let depth =
-                        || -parts[other].shape.approximate_distance(poses[other].inverse_transform_point(place));
-                    (place - middle).length_squared() < reach * reach && body.are_apart(limb, other) && depth() > DEEP
-                })
-            };
-            2 * ALONG_LIMB.iter().filter(inside).count() > ALONG_LIMB.len()
-        };
-        refill(limbs, (0..poses.len()).map(is_buried));
-        limbs
-    }
+/// Whether a limb has most of its axis inside other limbs, whose bounding spheres are `spheres`. Limbs that are joined, or have the
+/// same parent, are not tested against each other: they overlap in any pose.
+pub(super) fn is_buried(body: &Body, poses: &[Pose], spheres: &[(Vec3, f64)], limb: usize) -> bool {
+    let parts = body.limbs();
+    let inside = |fraction: &&f64| {
+        let place = poses[limb] * (**fraction * parts[limb].shape.length() * Vec3::Z);
+        (0..poses.len()).any(|other| {
+            let (middle, reach) = spheres[other];
+            let depth = || -parts[other].shape.approximate_distance(poses[other].inverse_transform_point(place));
+            (place - middle).length_squared() < reach * reach && body.are_apart(limb, other) && depth() > DEEP
+        })
+    };
+    2 * ALONG_LIMB.iter().filter(inside).count() > ALONG_LIMB.len()
 }
 
 #[cfg(test)]
@@ -51,9 +34,9 @@ mod tests {
 
     /// Names of the limbs that lie inside other limbs.
     fn buried<'a>(body: &'a Body, poses: &[Pose]) -> Vec<&'a str> {
-        let mut buried = Buried::default();
-        let found = buried.find(body, poses).iter().zip(body.limbs());
-        found.filter(|(inside, _)| **inside).map(|(_, limb)| limb.name.as_str()).collect()
+        let spheres: Vec<_> = body.limbs().iter().zip(poses).map(|(limb, pose)| limb.shape.sphere(pose)).collect();
+        let found = body.limbs().iter().enumerate().filter(|(limb, _)| is_buried(body, poses, &spheres, *limb));
+        found.map(|(_, limb)| limb.name.as_str()).collect()
     }
 
     #[test]

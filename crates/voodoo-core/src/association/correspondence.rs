@@ -166,15 +166,9 @@ impl LimbMatches {
         vectorized!(in_lanes(weight, distance, both)).into()
     }
 
-    /// Sum of the weights.
-    pub(crate) fn total_weight(&self) -> f64 {
-        let [total] = vectorized!(in_lanes(&self.weight, &self.weight, |weight, _| [f64::from(weight)]));
-        total
-    }
-
-    /// Sum of the weights and weighted sum of squared distances of accepted pairs.
-    pub(crate) fn accepted(&self) -> (usize, f64) {
-        (self.weight.iter().filter(|weight| **weight > 0.0).count(), self.weighed().1)
+    /// Number of accepted pairs.
+    pub(crate) fn accepted(&self) -> usize {
+        self.weight.iter().filter(|weight| **weight > 0.0).count()
     }
 }
 
@@ -212,7 +206,7 @@ impl Correspondences {
     /// Total weight of a limb's measurements: its points and its sites.
     pub(crate) fn measured_weight(&self, limb: usize) -> f64 {
         let sites: f64 = self.sites.iter().filter(|pair| pair.limb == limb).map(|pair| pair.weight).sum();
-        self.limbs[limb].total_weight() + sites
+        self.limbs[limb].weighed().0 + sites
     }
 
     /// Mean squared distance of the surface points that fit, meters squared. Geman-McClure weights of `scale` suppress points

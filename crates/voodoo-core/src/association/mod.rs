@@ -5,8 +5,9 @@
 //! 6, K07 4.3) are in `landmarks`. `contour` adds the rims of limbs. All of them produce the types of `correspondence`, which
 //! are all that solvers get.
 
+mod buried;
+
 pub(crate) mod assignment;
-pub(crate) mod buried;
 pub(crate) mod contour;
 pub(crate) mod correspondence;
 pub(crate) mod landmarks;

@@ -4,6 +4,7 @@
 //! The bounding box of a cluster of points gives a lower bound of the distance to every limb. Only limbs that can still be the
 //! nearest of some point are evaluated point by point.
 
+use super::buried::is_buried;
 use crate::body::{Body, Limb};
 use crate::math::{LANES, Pose, Vec3, refill, vectorized};
 use crate::observation::clusters::{Bounds, CLUSTER, Cluster, Clusters};
@@ -26,6 +27,8 @@ type Squares = [f32; CLUSTER];
 #[derive(Debug, Default)]
 pub(crate) struct NearestLimb {
     limbs: Vec<LimbBox>,
+    /// Bounding spheres of the limbs.
+    spheres: Vec<(Vec3, f64)>,
     groups: Vec<Group>,
     least: Vec<LimbLanes>,
     /// The limbs that were nearest to two points of each cluster in the last call: evaluated first, as they are probably nearest
@@ -34,26 +37,26 @@ pub(crate) struct NearestLimb {
 }
 
 impl NearestLimb {
-    /// Sets the limb poses, with the boxes enlarged by `margin`. `buried` limbs contain no point; an empty slice means that none
-    /// is buried.
-    pub(crate) fn place(&mut self, body: &Body, poses: &[Pose], margin: f64, buried: &[bool]) {
-        refill(&mut self.limbs, body.limbs().iter().zip(poses).map(|(limb, pose)| LimbBox::new(limb, pose, margin)));
-        for (limb, _) in self.limbs.iter_mut().zip(buried).filter(|(_, buried)| **buried) {
-            (limb.low, limb.high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    /// Sets the limb poses, with the boxes enlarged by `margin`. Limbs inside other limbs contain no point unless `buried`.
+    pub(crate) fn place(&mut self, body: &Body, poses: &[Pose], margin: f64, buried: bool) {
+        let limbs = || body.limbs().iter().zip(poses);
+        refill(&mut self.limbs, limbs().map(|(limb, pose)| LimbBox::new(limb, pose, margin)));
+        refill(&mut self.spheres, limbs().map(|(limb, pose)| limb.shape.sphere(pose)));
+        for (index, limb) in self.limbs.iter_mut().enumerate().filter(|_| !buried) {
+            if is_buried(body, poses, &self.spheres, index) {
+                (limb.low, limb.high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+            }
         }
         refill(&mut self.groups, self.limbs.chunks(LANES).map(Group::new));
     }
 
     /// Writes the nearest limb of every point, or [`NONE`], to `nearest`.
-    ///
-    /// If `inside` has room, it gets for every point and limb whether the limb's box contains the point; otherwise pass it
-    /// empty.
-    pub(crate) fn find(&mut self, clusters: &Clusters, nearest: &mut [u32], inside: &mut [bool]) {
+    pub(crate) fn find(&mut self, clusters: &Clusters, nearest: &mut [u32]) {
         self.least.resize(self.groups.len(), [OUTSIDE; LANES]);
         self.expected.resize(clusters.iter().len(), [0; 2]);
         vectorized!({
             for (index, cluster) in clusters.iter().enumerate() {
-                let found = self.find_cluster(index, &cluster, inside);
+                let found = self.find_cluster(index, &cluster);
                 for (which, limb) in cluster.which.iter().zip(found) {
                     nearest[*which as usize] = limb;
                 }
@@ -61,9 +64,14 @@ impl NearestLimb {
         });
     }
 
+    /// The limbs whose boxes contain a point.
+    pub(crate) fn around(&self, [x, y, z]: [f32; 3]) -> impl Iterator<Item = usize> {
+        self.limbs.iter().enumerate().filter(move |(_, limb)| limb.holds(limb.local(x, y, z))).map(|(index, _)| index)
+    }
+
     #[inline(always)]
-    fn find_cluster(&mut self, index: usize, cluster: &Cluster, inside: &mut [bool]) -> [u32; CLUSTER] {
-        let Self { limbs, groups, least, expected } = self;
+    fn find_cluster(&mut self, index: usize, cluster: &Cluster) -> [u32; CLUSTER] {
+        let Self { limbs, groups, least, expected, .. } = self;
         for (least, group) in least.iter_mut().zip(groups) {
             *least = group.least_squares(cluster.bounds);
         }
@@ -71,31 +79,21 @@ impl NearestLimb {
         // The distances to the expected limbs decide which others must be evaluated. After a reset there may be fewer limbs.
         let [first, second] = expected[index].map(|limb| (limb as usize).min(limbs.len() - 1));
         best.offer(first as u32, &limbs[first].squares(cluster));
-        if inside.is_empty() {
-            if second != first {
-                best.offer(second as u32, &limbs[second].squares(cluster));
+        if second != first {
+            best.offer(second as u32, &limbs[second].squares(cluster));
+        }
+        for (start, least) in (0..).step_by(LANES).zip(least.iter()) {
+            let mut remaining = within(least, best.worst());
+            for limb in [first, second] {
+                remaining &= !(1_u32.checked_shl((limb as u32).wrapping_sub(start)).unwrap_or(0));
             }
-            for (start, least) in (0..).step_by(LANES).zip(least.iter()) {
-                let mut remaining = within(least, best.worst());
-                for limb in [first, second] {
-                    remaining &= !(1_u32.checked_shl((limb as u32).wrapping_sub(start)).unwrap_or(0));
-                }
-                while remaining != 0 {
-                    let limb = start + remaining.trailing_zeros();
-                    best.offer(limb, &limbs[limb as usize].squares(cluster));
-                    remaining &= remaining - 1;
-                    if remaining != 0 {
-                        // The bound may now exclude some of the remaining limbs.
-                        remaining &= within(least, best.worst());
-                    }
-                }
-            }
-        } else {
-            for (limb, shape) in limbs.iter().enumerate() {
-                let squares = shape.squares(cluster);
-                best.offer(limb as u32, &squares);
-                for (which, square) in cluster.which.iter().zip(squares) {
-                    inside[*which as usize * limbs.len() + limb] = square < OUTSIDE;
+            while remaining != 0 {
+                let limb = start + remaining.trailing_zeros();
+                best.offer(limb, &limbs[limb as usize].squares(cluster));
+                remaining &= remaining - 1;
+                if remaining != 0 {
+                    // The bound may now exclude some of the remaining limbs.
+                    remaining &= within(least, best.worst());
                 }
             }
         }
@@ -317,14 +315,11 @@ mod tests {
             let poses = body.rest_pose(Pose::new(Vec3::ZERO, Vec3::new(0.1, 0.2, 0.3) * seed as f64));
             let points = around(seed);
             clusters.arrange(&points);
-            let (mut quick, mut thorough) = (vec![NONE; points.len()], vec![NONE; points.len()]);
-            search.place(&body, &poses, margin, &[]);
-            search.find(&clusters, &mut quick, &mut []);
-            let mut inside = vec![false; points.len() * poses.len()];
-            search.find(&clusters, &mut thorough, &mut inside);
-            assert_eq!(quick, thorough);
+            let mut nearest = vec![NONE; points.len()];
+            search.place(&body, &poses, margin, true);
+            search.find(&clusters, &mut nearest);
             let mut found = 0;
-            for (index, nearest) in quick.iter().enumerate() {
+            for (index, nearest) in nearest.iter().enumerate() {
                 let squares = search.limbs.iter().map(|limb| {
                     let local = limb.local(points.x[index], points.y[index], points.z[index]);
                     if limb.holds(local) { limb.square(local) } else { OUTSIDE }
@@ -334,9 +329,8 @@ mod tests {
                 let first = squares.iter().position(|square| *square == least && least < OUTSIDE);
                 assert_eq!(first.map_or(NONE, |limb| limb as u32), *nearest);
                 found += usize::from(first.is_some());
-                for (limb, square) in squares.iter().enumerate() {
-                    assert_eq!(inside[index * poses.len() + limb], *square < OUTSIDE);
-                }
+                let around = search.around([points.x[index], points.y[index], points.z[index]]);
+                assert!(around.eq((0..squares.len()).filter(|limb| squares[*limb] < OUTSIDE)));
             }
             assert!(found > 400, "{found}");
         }

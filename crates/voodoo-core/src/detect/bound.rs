@@ -4,7 +4,7 @@ use super::{Detect, DetectError, Detected, DetectedJoint, Detection, DetectionQu
 use crate::body::Body;
 use crate::math::{Aabb, Vec3, is_place};
 use crate::observation::frame::DepthImage;
-use std::fmt::Arguments;
+use std::fmt::Display;
 
 /// A detection and the position of the body's root that follows from it.
 #[derive(Clone, Debug)]
@@ -21,9 +21,12 @@ pub(crate) struct PlacedDetection {
 #[derive(Debug, Default)]
 pub(crate) struct BoundDetector {
     detector: Option<Box<dyn Detect>>,
-    map: JointMap,
-    knows: bool,
-    error: Option<DetectError>,
+    /// The mapping of its joints and lengths to the body.
+    pub map: JointMap,
+    /// Whether a detector is set and can find the body.
+    pub knows: bool,
+    /// The last error since this was cleared.
+    pub error: Option<DetectError>,
 }
 
 impl BoundDetector {
@@ -41,29 +44,9 @@ impl BoundDetector {
         self.knows = detector.is_some_and(|detector| detector.knows(body));
     }
 
-    /// Whether a detector is set and can find the body.
-    pub(crate) fn knows(&self) -> bool {
-        self.knows
-    }
-
-    /// The mapping of its joints and lengths to the body.
-    pub(crate) fn map(&self) -> &JointMap {
-        &self.map
-    }
-
     /// Another detector of the same kind with no state from images.
     pub(crate) fn fresh(&self) -> Option<Box<dyn Detect>> {
         self.detector.as_ref().map(|detector| detector.fresh())
-    }
-
-    /// The last error since [`Self::clear_error`].
-    pub(crate) fn error(&self) -> Option<&DetectError> {
-        self.error.as_ref()
-    }
-
-    /// Clears the last error.
-    pub(crate) fn clear_error(&mut self) {
-        self.error = None;
     }
 
     /// Returns the persons that the detector reports in an image; for [`DetectionQuery::Near`] only the nearest. Returns none
@@ -77,16 +60,15 @@ impl BoundDetector {
     ) -> Vec<PlacedDetection> {
         let Some(detector) = self.detector.as_mut() else { return Vec::new() };
         let checked = detector.detect(image, around, query).and_then(|found| {
-            found.iter().enumerate().try_for_each(|(index, detection)| check(index, detection, &self.map, image))?;
+            for (index, detection) in found.iter().enumerate() {
+                check(detection, &self.map, image).map_err(|wrong| format!("detection[{index}].{wrong}"))?;
+            }
             Ok(found)
         });
-        let found = match checked {
-            Ok(found) => found,
-            Err(error) => {
-                self.error = Some(error);
-                return Vec::new();
-            }
-        };
+        let found = checked.unwrap_or_else(|error| {
+            self.error = Some(error);
+            Vec::new()
+        });
         let map = &self.map;
         let placed = |(index, detection): (usize, Detection)| {
             let root = place(body, Detected { detection: &detection, map })?;
@@ -121,50 +103,44 @@ impl BoundDetector {
 /// Fills in the pixels of a detection: those within its box, where the detector does not report any.
 fn with_pixels(mut detection: Detection, image: &DepthImage, around: &Surroundings) -> Detection {
     if detection.pixels.is_empty() {
-        let bounds = Aabb { mins: detection.low, maxs: detection.high };
         let mut depth = Vec::new();
         around.open_depth(image, &mut depth);
-        let within =
-            |index: &usize| bounds.contains(image.world_from_sensor * image.back_project(*index, depth[*index]));
+        let within = |index: &usize| {
+            detection.bounds.contains(image.world_from_sensor * image.back_project(*index, depth[*index]))
+        };
         detection.pixels = (0..depth.len()).filter(|index| depth[*index] > 0.0).filter(within).collect();
     }
     detection
 }
 
 /// Rejects a detection with invalid values.
-fn check(index: usize, detection: &Detection, map: &JointMap, image: &DepthImage) -> Result<(), DetectError> {
-    let Detection { joints, lengths, facing, person, low, high, floor, pixels } = detection;
-    let unless = |valid: bool, what: Arguments, expected: Arguments, found: Arguments| match valid {
-        true => Ok(()),
-        false => Err(DetectError::from(format!("detection[{index}].{what}: expected {expected}, found {found}"))),
-    };
-    let count = |what, found: usize, named: usize| {
-        unless(found == named, what, format_args!("{named}, as the detector names them"), format_args!("{found}"))
-    };
-    count(format_args!("joints"), joints.len(), map.sites.len())?;
-    if !lengths.is_empty() {
-        count(format_args!("lengths"), lengths.len(), map.lengths)?;
-    }
+fn check(detection: &Detection, map: &JointMap, image: &DepthImage) -> Result<(), String> {
+    let Detection { joints, lengths, facing, person, bounds, floor, pixels } = detection;
+    let (found, named) = (joints.len(), map.sites.len());
+    unless(found == named, "joints", format_args!("{named}, as the detector names them"), found)?;
+    let (found, named) = (lengths.len(), map.lengths);
+    unless(found == 0 || found == named, "lengths", format_args!("{named}, as the detector names them"), found)?;
     for (number, joint) in joints.iter().enumerate() {
         let Some(DetectedJoint { position, sigma, visible }) = joint else { continue };
-        let (what, meters) = (format_args!("joints[{number}]"), format_args!("finite meters"));
-        unless(is_place(*position), what, meters, format_args!("{position:?}"))?;
-        let (valid, expected) = (*sigma > 0.0 && sigma.is_finite(), format_args!("finite meters > 0"));
-        unless(valid, format_args!("{what}.sigma"), expected, format_args!("{sigma}"))?;
-        let (valid, expected) = ((0.0..=1.0).contains(visible), format_args!("0 to 1"));
-        unless(valid, format_args!("{what}.visible"), expected, format_args!("{visible}"))?;
+        let what = format_args!("joints[{number}]");
+        unless(is_place(*position), what, "finite meters", position)?;
+        unless(*sigma > 0.0 && sigma.is_finite(), format_args!("{what}.sigma"), "finite meters > 0", sigma)?;
+        unless((0.0..=1.0).contains(visible), format_args!("{what}.visible"), "0 to 1", visible)?;
     }
-    for pair in lengths {
-        let valid = pair.iter().all(|value| *value > 0.0 && value.is_finite());
-        unless(valid, format_args!("lengths"), format_args!("finite numbers > 0"), format_args!("{pair:?}"))?;
+    for length in lengths.as_flattened() {
+        unless(*length > 0.0 && length.is_finite(), "lengths", "finite numbers > 0", length)?;
     }
     let valid = !person.is_nan() && !facing.is_some_and(f64::is_nan);
-    unless(valid, format_args!("person and facing"), format_args!("log odds"), format_args!("no number"))?;
-    let (valid, found) = (is_place(*low) && is_place(*high), format_args!("{low:?} and {high:?}"));
-    unless(valid, format_args!("low and high"), format_args!("finite meters"), found)?;
+    unless(valid, "person and facing", "log odds", "no number")?;
+    let valid = is_place(bounds.mins) && is_place(bounds.maxs);
+    unless(valid, "bounds", "finite meters", format_args!("{bounds:?}"))?;
     let valid = floor.is_none_or(|floor| floor.normal.is_finite() && floor.offset.is_finite());
-    unless(valid, format_args!("floor"), format_args!("finite numbers"), format_args!("{floor:?}"))?;
+    unless(valid, "floor", "finite numbers", format_args!("{floor:?}"))?;
     let (most, below) = (pixels.iter().max().copied().unwrap_or_default(), image.pixels.len());
-    let expected = format_args!("indices below {below}");
-    unless(pixels.is_empty() || most < below, format_args!("pixels"), expected, format_args!("{most}"))
+    unless(pixels.is_empty() || most < below, "pixels", format_args!("indices below {below}"), most)
+}
+
+/// Rejects a value that is not valid; the text is made only then.
+fn unless(valid: bool, what: impl Display, expected: impl Display, found: impl Display) -> Result<(), String> {
+    if valid { Ok(()) } else { Err(format!("{what}: expected {expected}, found {found}")) }
 }

@@ -119,6 +119,11 @@ impl<'a> Detected<'a> {
         self.map.on_limb.get(limb)?.iter().find_map(|joint| self.joint(*joint))
     }
 
+    /// The stature, meters, and its relative standard deviation, if they were reported.
+    pub(crate) fn stature(&self) -> Option<[f64; 2]> {
+        self.detection.lengths.get(self.map.stature?).copied()
+    }
+
     /// The detected ankles.
     pub(crate) fn ankles(&self) -> impl Iterator<Item = &'a DetectedJoint> + '_ {
         self.map.skeleton.legs.iter().filter_map(|leg| self.joint(leg[2]?))

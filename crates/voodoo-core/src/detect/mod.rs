@@ -159,7 +159,7 @@ pub struct DetectedJoint {
 /// let joint = |x, y, z| Some(DetectedJoint { position: Vec3::new(x, y, z), sigma: 0.05, visible: 0.9 });
 /// let mut person = Detection::new(vec![joint(2.4, -0.2, 1.45), joint(2.4, 0.2, 1.45), None], 5.0);
 /// person.facing = Some(3.0);
-/// assert!((person.high.y - 0.4).abs() < 1e-12); // the box around the joints has a margin of 0.2 m
+/// assert!((person.bounds.maxs.y - 0.4).abs() < 1e-12); // the box around the joints has a margin of 0.2 m
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Detection {
@@ -172,10 +172,8 @@ pub struct Detection {
     /// Log odds `ln(p / (1 - p))` that it is a person. A sum of approximately 4, over one or several detections, confirms a
     /// person.
     pub person: f64,
-    /// Lower corner of the box around the observed surface, world frame, meters.
-    pub low: Vec3,
-    /// Upper corner.
-    pub high: Vec3,
+    /// Box around the observed surface, world frame, meters.
+    pub bounds: Aabb,
     /// The ground plane, estimated from the image or given by [`Surroundings::ground`], world frame.
     pub floor: Option<Ground>,
     /// Indices of its pixels. If empty, the pixels within its box are used.
@@ -185,11 +183,9 @@ pub struct Detection {
 impl Detection {
     /// A person with these joints and log odds. The joints span its box; nothing else is reported.
     pub fn new(joints: Vec<Option<DetectedJoint>>, person: f64) -> Self {
-        let positions = || joints.iter().flatten().map(|joint| joint.position);
-        let around = Vec3::splat(AROUND_JOINTS);
-        let low = positions().reduce(Vec3::min).unwrap_or_default() - around;
-        let high = positions().reduce(Vec3::max).unwrap_or_default() + around;
-        Self { low, high, joints, person, ..Self::default() }
+        let positions = joints.iter().flatten().map(|joint| Aabb::new(joint.position, joint.position));
+        let bounds = positions.reduce(Aabb::union).unwrap_or_default().enlarged(AROUND_JOINTS);
+        Self { bounds, joints, person, ..Self::default() }
     }
 }
 

@@ -56,8 +56,7 @@ fn with_sizes(reference: &Body, detected: Detected) -> Option<Body> {
     if lengths.iter().all(Option::is_none) {
         return Some(reference.clone());
     }
-    let stature = map.stature.and_then(|stature| detection.lengths.get(stature));
-    let grown = stature.map(|[stature, _]| reference.with_proportions_of(*stature));
+    let grown = detected.stature().map(|[stature, _]| reference.with_proportions_of(stature));
     let reference = grown.as_ref().unwrap_or(reference);
     let mut joints = at_rest(reference, &map.sites);
     map.skeleton.take_lengths(&mut joints, &lengths);

@@ -31,7 +31,8 @@ impl<'a> Context<'a> {
 
     /// Returns the context with fewer points, where there are many.
     pub(crate) fn subsampled(self) -> Self {
-        Self { observation: self.observation.with(self.observation.candidates.subsampled()), ..self }
+        let candidates = self.observation.candidates.subsampled();
+        Self { observation: Observation { candidates, ..self.observation }, ..self }
     }
 
     /// Whether color edges are used for a limb: for all limbs without points, and for arms with points, which are blurred there

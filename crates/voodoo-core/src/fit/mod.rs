@@ -8,7 +8,6 @@ pub(crate) use context::{Context, Setting};
 pub(crate) use motion::{Motion, UNKNOWN_MOTION};
 
 use crate::association::assignment::{Assignment, match_limb};
-use crate::association::buried::Buried;
 use crate::association::contour::Contours;
 use crate::association::correspondence::{Correspondences, LimbMatches};
 use crate::association::visible_side::match_visible_side;
@@ -31,7 +30,6 @@ pub(crate) struct Fit {
     warm_start: WarmStart,
     whole_body: WholeBody,
     assignment: Assignment,
-    buried: Buried,
     /// The last correspondences.
     pub(crate) correspondences: Correspondences,
     /// The depth-contour edges that were found last.
@@ -213,7 +211,7 @@ impl Fit {
     fn assign(&mut self, context: Context, poses: &[Pose], gate: &Gate) {
         let Context { config, model, observation, .. } = context;
         // The published solver uses points anywhere on its limbs.
-        let buried = if config.solver.is_whole_body() { self.buried.find(&model.body, poses) } else { &[] };
+        let buried = !config.solver.is_whole_body();
         self.assignment.assign(&model.body, poses, observation.candidates, config.overlap, gate.box_margin, buried);
     }
 
@@ -340,7 +338,7 @@ mod tests {
                 fit.match_points(context, poses, &Gate { distance, ..GATE });
                 assert!(fit.correspondences.sites.is_empty() && fit.correspondences.contour.is_empty());
                 let limbs = fit.correspondences.limbs.iter();
-                limbs.map(|limb| limb.accepted().0).sum::<usize>() as f64 / context.observation.candidates.len() as f64
+                limbs.map(|limb| limb.accepted()).sum::<usize>() as f64 / context.observation.candidates.len() as f64
             };
             assert!(matched(0.1, &poses) > 0.95);
             let deeper = moved(&poses, 0.06 * Vec3::Z);

@@ -109,7 +109,7 @@ impl Mul<Vec3> for Pose {
 }
 
 /// An axis-aligned box.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Aabb {
     /// The corner with the smallest coordinates, meters.
     pub mins: Vec3,

@@ -2,7 +2,6 @@
 
 use crate::math::{Pose, refill};
 use crate::observation::frame::{DepthImage, Frame};
-use crate::observation::observer::Own;
 use crate::observation::ownership::{NO_OWNER, OwnershipMask};
 
 /// A pixel belongs to the background unless it lies more than this in front of it: meters, plus a fraction of the depth, because
@@ -19,10 +18,18 @@ pub(crate) const OTHERS: f32 = f32::MIN_POSITIVE;
 pub(crate) struct Background {
     pub(super) world_from_sensor: Pose,
     pub(super) width: usize,
-    pub(super) depth: Vec<f32>,
+    pub depth: Vec<f32>,
     /// The ray `(x/z, y/z)` on which each depth was observed; empty while the camera has not moved: then it is the ray through
     /// the pixel center.
     pub(super) rays: Vec<[f32; 2]>,
+    /// Recent depth of each pixel where the scene is not known, or of the person there, and the number of consecutive observations:
+    /// it may become part of the scene.
+    pub pending: Vec<f32>,
+    pub frames: Vec<u8>,
+    /// Stamp since which the camera has been at its position, seconds; `None` in the first frame.
+    pub since: Option<f64>,
+    /// Whether the whole image of the second frame was learned.
+    pub filled: bool,
 }
 
 /// The backgrounds of all depth images, in the order of the frame.
@@ -38,12 +45,6 @@ pub(super) fn pose_difference(a: &Pose, b: &Pose) -> (f64, f64) {
     (a.translation.distance(b.translation), a.rotation.angle_between(b.rotation))
 }
 
-/// Whether a camera is still at its previous pose.
-fn is_static(a: &Pose, b: &Pose) -> bool {
-    let (meters, radians) = pose_difference(a, b);
-    a == b || (meters <= STANDS.0 && radians <= STANDS.1)
-}
-
 impl Background {
     /// Whether a return at `z` meters in pixel `index` belongs to the background.
     #[inline(always)]
@@ -53,7 +54,12 @@ impl Background {
 
     /// Whether this background belongs to the image: to the same camera at the same pose.
     pub(super) fn fits(&self, image: &DepthImage) -> bool {
-        self.is_sized_like(image) && is_static(&self.world_from_sensor, &image.world_from_sensor)
+        let (a, b) = (&self.world_from_sensor, &image.world_from_sensor);
+        let stands = || {
+            let (meters, radians) = pose_difference(a, b);
+            meters <= STANDS.0 && radians <= STANDS.1
+        };
+        self.is_sized_like(image) && (a == b || stands())
     }
 
     pub(super) fn is_sized_like(&self, image: &DepthImage) -> bool {
@@ -63,7 +69,7 @@ impl Background {
 
 impl Backgrounds {
     /// The background of this image, if its camera has not moved.
-    fn of_image(&self, image: &DepthImage) -> Option<&Background> {
+    pub(crate) fn of_image(&self, image: &DepthImage) -> Option<&Background> {
         self.images.iter().find(|background| background.fits(image))
     }
 
@@ -72,10 +78,9 @@ impl Backgrounds {
         self.of_image(image).map_or(&[], |background| &background.depth)
     }
 
-    /// The learned depths of this image, to be changed.
-    pub(crate) fn depth_mut(&mut self, image: &DepthImage) -> Option<&mut [f32]> {
-        let known = self.images.iter_mut().find(|background| background.fits(image));
-        known.map(|background| background.depth.as_mut_slice())
+    /// The background of this image, to be changed.
+    pub(crate) fn of_image_mut(&mut self, image: &DepthImage) -> Option<&mut Background> {
+        self.images.iter_mut().find(|background| background.fits(image))
     }
 
     /// Whether another person explains a point of a cloud, by the indices of cloud and point.
@@ -87,8 +92,9 @@ impl Backgrounds {
     /// of the cameras.
     pub(super) fn mask(&mut self, frame: &Frame, ownership: OwnershipMask) {
         let is_others = |owner: &u16| *owner != NO_OWNER && *owner != ownership.own;
-        self.others.resize_with(ownership.cloud_owners.len(), Vec::new);
-        for (others, owners) in self.others.iter_mut().zip(ownership.cloud_owners) {
+        let of_clouds = ownership.owners.get(frame.images.len()..).unwrap_or(&[]);
+        self.others.resize_with(of_clouds.len(), Vec::new);
+        for (others, owners) in self.others.iter_mut().zip(of_clouds) {
             refill(others, owners.iter().map(is_others));
         }
         if frame.images.is_empty() {
@@ -105,13 +111,13 @@ impl Backgrounds {
         }
     }
 
-    /// Sets the learned depth to unknown at pixels that show a person. Depths learned behind the person stay: without them, the
-    /// background would look like a flat body once the person is gone.
-    pub(crate) fn release(&mut self, frame: &Frame, own: Own) {
-        let Some(image) = frame.images.get(own.image) else { return };
-        let Some(depth) = self.depth_mut(image) else { return };
-        for pixel in own.pixels {
-            if let Some(depth) = depth.get_mut(*pixel)
+    /// Sets the learned depth to unknown at pixels, of the image with this index, that show a person. Depths learned behind the person
+    /// stay: without them, the background would look like a flat body once the person is gone.
+    pub(crate) fn release(&mut self, frame: &Frame, image: usize, pixels: &[usize]) {
+        let Some(image) = frame.images.get(image) else { return };
+        let Some(known) = self.of_image_mut(image) else { return };
+        for pixel in pixels {
+            if let Some(depth) = known.depth.get_mut(*pixel)
                 && image.depth(*pixel).is_none_or(|z| Background::contains(*depth, z))
             {
                 *depth = 0.0;
@@ -119,12 +125,11 @@ impl Backgrounds {
         }
     }
 
-    /// Gives every image of a frame a background, if only an empty one. `moved` is called with the index of each image whose
-    /// camera moved, and with whether the learned depths were carried over.
-    pub(crate) fn register(&mut self, frame: &Frame, mut moved: impl FnMut(usize, bool)) {
-        for (number, image) in frame.images.iter().enumerate() {
+    /// Gives every image of a frame a background: an empty one for a new camera, or one that moved far.
+    pub(crate) fn register(&mut self, frame: &Frame) {
+        for image in frame.images {
             if self.of_image(image).is_none() {
-                moved(number, self.carry_over(image, frame));
+                self.carry_over(image, frame);
             }
         }
     }
@@ -154,7 +159,7 @@ mod tests {
             if known {
                 learn(&mut backgrounds, &frame, |_| true);
             }
-            backgrounds.register(&frame, |_, _| {});
+            backgrounds.register(&frame);
             [0.0, 1.0, 2.0].map(|x| {
                 let learned = backgrounds.of_image(&image(x)).map(|known| &known.depth);
                 learned.map(|depth| depth.iter().filter(|depth| **depth > 0.0).count())

@@ -13,10 +13,9 @@ const NEAREST_CARRIED: f32 = 0.1;
 const CRACK_STEP: f32 = 0.15;
 
 impl Backgrounds {
-    /// Gives an image that has none a background, and returns whether it contains learned depths. If the same camera learned a
-    /// background at another pose nearby, that one is carried over to the current pose; otherwise the background is empty. Reuses
-    /// the slot of a background that no image of the frame has.
-    pub(super) fn carry_over(&mut self, image: &DepthImage, frame: &Frame) -> bool {
+    /// Gives an image that has none a background. If the same camera learned one at another pose nearby, that is carried over to the
+    /// current pose; otherwise the background is empty. Reuses the slot of a background that no image of the frame has.
+    pub(super) fn carry_over(&mut self, image: &DepthImage, frame: &Frame) {
         let gone = |background: &Background| !frame.images.iter().any(|image| background.fits(image));
         let leap = |background: &Background| {
             let (meters, radians) = pose_difference(&background.world_from_sensor, &image.world_from_sensor);
@@ -39,10 +38,12 @@ impl Backgrounds {
         } else {
             reset(&mut background.depth, image.pixels.len(), 0.0);
             background.rays.clear();
+            (background.since, background.filled) = (None, false);
         }
+        background.pending.resize(image.pixels.len(), 0.0);
+        background.frames.resize(image.pixels.len(), 0);
         background.world_from_sensor = image.world_from_sensor;
         background.width = image.camera.width();
-        nearest.is_some()
     }
 }
 
@@ -156,7 +157,7 @@ mod tests {
             let pixels = view_from(camera, &now);
             let frame = [image(&pixels, camera, now)];
             let frame = Frame { images: &frame, ..Frame::empty(f64::from(step)) };
-            backgrounds.register(&frame, |_, _| {});
+            backgrounds.register(&frame);
             let depth = backgrounds.depth(&frame.images[0]);
             known = depth.iter().filter(|z| **z > 0.0).count();
             // Within one pixel: the step falls between two pixels.
@@ -180,7 +181,7 @@ mod tests {
         let mut known = |now: Pose| {
             let frame = [image(&pixels, &camera, now)];
             let frame = Frame { images: &frame, ..Frame::empty(0.0) };
-            backgrounds.register(&frame, |_, _| {});
+            backgrounds.register(&frame);
             if now == pose(0.0, 0.0) {
                 learn(&mut backgrounds, &frame, |_| true);
             }

@@ -61,9 +61,8 @@ impl Candidates {
             Some(ground) => (ground.normal, ground.relative_to(origin).offset + config.ground_clearance),
             None => (Vec3::ZERO, -1.0),
         };
-        let to_f32 = |v: Vec3| v.to_array().map(|value| value as f32);
-        let gate =
-            PointGate { low: to_f32(bounds.mins), high: to_f32(bounds.maxs), up: to_f32(up), floor: floor as f32 };
+        let [low, high, up] = [bounds.mins, bounds.maxs, up].map(|v| v.as_vec3().to_array());
+        let gate = PointGate { low, high, up, floor: floor as f32 };
         for view in views.iter() {
             let first = self.points.len();
             self.gather_image(&view, bounds, &gate, config.max_points);
@@ -242,8 +241,8 @@ mod tests {
         let frame = Frame { images: &images, ground, ..Frame::empty(0.0) };
         let mut backgrounds = Backgrounds::default();
         // Everything farther than 2.6 m is scene.
-        backgrounds.register(&frame, |_, _| {});
-        let depths = backgrounds.depth_mut(&images[0]).unwrap();
+        backgrounds.register(&frame);
+        let depths = &mut backgrounds.of_image_mut(&images[0]).unwrap().depth;
         depths.iter_mut().zip(&pixels).for_each(|(depth, z)| *depth = 2.6 + 1e-6 * if *z > 0.0 { *z } else { 0.0 });
         let origin = Vec3::new(2.3, 0.0, 1.0);
         let bounds = Aabb::new(Vec3::new(-0.4, -0.3, -0.6), Vec3::new(0.4, 0.5, 0.4));

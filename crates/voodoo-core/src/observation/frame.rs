@@ -71,7 +71,7 @@ pub enum Scope {
 ///     scope: Scope::Limb(body.limb_index("l_hand")?),
 ///     source: 0,
 /// };
-/// Frame::empty(0.0).with_clouds(&[cloud]).check(&body, None)?;
+/// Frame { clouds: &[cloud], ..Frame::empty(0.0) }.check(&body, None)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
@@ -212,7 +212,7 @@ pub struct PositionRelation {
 /// let (site, world_from_sensor) = (body.site_index("l_wrist")?, Pose::IDENTITY);
 /// let (origin, direction) = (world_from_sensor.translation, world_from_sensor.rotation * Vec3::new(x, y, 1.0));
 /// let ray = RayRelation { site, origin, direction, weight: 8.0, bias: 0.0, source: 0 };
-/// Frame::empty(0.0).with_rays(&[ray]).check(&body, None)?;
+/// Frame { rays: &[ray], ..Frame::empty(0.0) }.check(&body, None)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -249,7 +249,7 @@ pub struct RayRelation {
 /// let positions: Vec<PositionRelation> = (0..body.sites().len()).map(measured).collect();
 /// let person = DetectedPerson { positions: &positions, person: f64::INFINITY };
 /// let mut tracker = Tracker::new(body, Config::default())?;
-/// let estimate = tracker.step(&Frame::empty(0.0).with_detections(&[person]))?;
+/// let estimate = tracker.step(&Frame { detections: &[person], ..Frame::empty(0.0) })?;
 /// assert!(estimate.world_from_limb[0].translation.distance(standing[0].translation) < 0.01);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -293,7 +293,7 @@ impl Ground {
 
 /// All measurements of one instant.
 ///
-/// [`Frame::empty`] makes one without measurements; add them with the `with_` methods, or set the fields.
+/// [`Frame::empty`] makes one without measurements, for the fields that are not given.
 ///
 /// ```
 /// use voodoo_core::math::Vec3;
@@ -302,15 +302,13 @@ impl Ground {
 /// let body = Body::human(1.75, HumanModel::Measured)?;
 /// let site = body.site_index("l_wrist")?;
 /// let wrist = PositionRelation { site, position: Vec3::new(0.1, 0.2, 1.5), weight: 20.0, bias: 0.0, source: 0 };
-/// let frame = Frame::empty(0.0)
-///     .with_positions(std::slice::from_ref(&wrist))
-///     .with_ground(Ground { normal: Vec3::Z, offset: 0.0 });
+/// let ground = Some(Ground { normal: Vec3::Z, offset: 0.0 });
+/// let frame = Frame { positions: &[wrist], ground, ..Frame::empty(0.0) };
 /// frame.check(&body, None)?;
 /// assert!(frame.check(&body, Some(1.0)).is_err()); // not after the previous frame
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Copy, Debug)]
-#[non_exhaustive]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Frame<'a> {
     /// Seconds.
     pub stamp: f64,
@@ -332,45 +330,10 @@ pub struct Frame<'a> {
     pub excluded: &'a [Aabb],
 }
 
-/// Functions that return a frame with another part.
-macro_rules! with_parts {
-    ($($(#[$doc:meta])* $with:ident($part:ident: $type:ty);)*) => {$(
-        $(#[$doc])*
-        #[must_use]
-        pub fn $with(self, $part: $type) -> Self {
-            Self { $part, ..self }
-        }
-    )*};
-}
-
-impl<'a> Frame<'a> {
+impl Frame<'_> {
     /// A frame without measurements.
     pub fn empty(stamp: f64) -> Self {
-        let (positions, rays, detections) = Default::default();
-        Self { stamp, clouds: &[], images: &[], colors: &[], positions, rays, detections, ground: None, excluded: &[] }
-    }
-
-    with_parts! {
-        /// The frame with these 3-D points.
-        with_clouds(clouds: &'a [Cloud<'a>]);
-        /// The frame with these depth images.
-        with_images(images: &'a [DepthImage<'a>]);
-        /// The frame with these color images.
-        with_colors(colors: &'a [ColorImage<'a>]);
-        /// The frame with these site positions.
-        with_positions(positions: &'a [PositionRelation]);
-        /// The frame with these site rays.
-        with_rays(rays: &'a [RayRelation]);
-        /// The frame with these detected persons.
-        with_detections(detections: &'a [DetectedPerson<'a>]);
-        /// The frame with these boxes of the world whose points belong to no person.
-        with_excluded(excluded: &'a [Aabb]);
-    }
-
-    /// The frame with this ground plane, or without one.
-    #[must_use]
-    pub fn with_ground(self, ground: impl Into<Option<Ground>>) -> Self {
-        Self { ground: ground.into(), ..self }
+        Self { stamp, ..Self::default() }
     }
 
     /// Returns an error for unusable input, before any of it reaches the tracker's state.
@@ -386,8 +349,8 @@ impl<'a> Frame<'a> {
             check_weight(format_args!("points[{index}].weight"), cloud.weight)?;
             check_pose(format_args!("points[{index}].world_from_sensor"), &cloud.world_from_sensor)?;
             if let Scope::Limb(limb) = cloud.scope {
-                let what = format_args!("points[{index}].limb");
-                check_index(what, "the index of a limb", limb, body.limbs().len())?;
+                let (what, valid) = (format_args!("points[{index}].limb"), limb < body.limbs().len());
+                TrackError::unless(valid, what, "the index of a limb", limb)?;
             }
             if let Some(row) = (0..cloud.points.len()).find(|row| !is_place(cloud.points.get(*row))) {
                 let found = format!("{:?} in row {row}", cloud.points.get(row).to_array());
@@ -395,7 +358,12 @@ impl<'a> Frame<'a> {
             }
         }
         for (index, image) in self.images.iter().enumerate() {
-            check_image(index, image)?;
+            let (what, unit) = (format_args!("depth[{index}]"), image.meters_per_unit);
+            check_size(format_args!("{what}.image"), image.pixels.len(), image.camera)?;
+            let valid = unit > 0.0 && unit.is_finite();
+            TrackError::unless(valid, format_args!("{what}.meters_per_unit"), "a finite length above zero", unit)?;
+            check_weight(format_args!("{what}.weight"), image.weight)?;
+            check_pose(format_args!("{what}.world_from_sensor"), &image.world_from_sensor)?;
         }
         for (index, picture) in self.colors.iter().enumerate() {
             picture.check(index, self.stamp, &self.colors[..index])?;
@@ -419,11 +387,6 @@ impl<'a> Frame<'a> {
             let (what, found) = (format_args!("{what}.direction"), format_args!("{found:?}"));
             TrackError::unless(known, what, "a vector that is not zero", found)?;
         }
-        self.check_scene()
-    }
-
-    /// Rejects invalid ground planes and boxes.
-    fn check_scene(&self) -> Result<(), TrackError> {
         if let Some(Ground { normal, offset }) = self.ground {
             let valid = offset.is_finite() && normal.is_normalized();
             let found = format_args!("normal {:?} and offset {offset}", normal.to_array());
@@ -438,15 +401,6 @@ impl<'a> Frame<'a> {
     }
 }
 
-fn check_image(index: usize, image: &DepthImage) -> Result<(), TrackError> {
-    let (what, unit) = (format_args!("depth[{index}]"), image.meters_per_unit);
-    check_size(format_args!("{what}.image"), image.pixels.len(), image.camera)?;
-    let valid = unit > 0.0 && unit.is_finite();
-    TrackError::unless(valid, format_args!("{what}.meters_per_unit"), "a finite length above zero", unit)?;
-    check_weight(format_args!("{what}.weight"), image.weight)?;
-    check_pose(format_args!("{what}.world_from_sensor"), &image.world_from_sensor)
-}
-
 /// Rejects an image that has not a value for every pixel of its camera.
 pub(super) fn check_size(what: impl Display, pixels: usize, camera: &Camera) -> Result<(), TrackError> {
     let found = format_args!("{pixels} for {}x{}", camera.width(), camera.height());
@@ -459,14 +413,11 @@ fn check_position(what: impl Display, relation: &PositionRelation, body: &Body) 
 }
 
 fn check_relation(what: impl Display, site: usize, weight: f64, bias: f64, body: &Body) -> Result<(), TrackError> {
-    check_index(format_args!("{what}.site"), "the index of a site", site, body.sites().len())?;
+    let valid = site < body.sites().len();
+    TrackError::unless(valid, format_args!("{what}.site"), "the index of a site", site)?;
     check_weight(format_args!("{what}.weight"), weight)?;
     let valid = bias.is_finite() && bias >= 0.0;
     TrackError::unless(valid, format_args!("{what}.bias"), "a finite length, zero or above", bias)
-}
-
-fn check_index(what: impl Display, expected: &'static str, index: usize, count: usize) -> Result<(), TrackError> {
-    TrackError::unless(index < count, what, expected, index)
 }
 
 fn check_weight(what: impl Display, weight: f64) -> Result<(), TrackError> {

@@ -32,20 +32,6 @@ impl<'a> Observation<'a> {
     pub(crate) fn floor(&self) -> Option<Ground> {
         self.frame().ground.map(|ground| ground.relative_to(self.origin()))
     }
-
-    /// The same frame with other candidates.
-    pub(crate) fn with(self, candidates: &'a Candidates) -> Self {
-        Self { candidates, ..self }
-    }
-}
-
-/// Pixels of one depth image that show the body: the index of the image in the frame, and the indices of the pixels.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Own<'a> {
-    /// Index of the image.
-    pub image: usize,
-    /// Indices of pixels.
-    pub pixels: &'a [usize],
 }
 
 /// Holds the candidates of the current frame.
@@ -68,23 +54,18 @@ impl Observer {
         *self = Self::default();
     }
 
-    /// Finds which images of a frame are segmented, and what other persons hide.
-    pub(crate) fn begin(&mut self, frame: &Frame, ownership: OwnershipMask) {
+    /// Finds which images of a frame are segmented, and what other persons hide. The pixels `own` of the image with an index show the
+    /// body in this frame, even where they are known as the scene.
+    pub(crate) fn begin(&mut self, frame: &Frame, ownership: OwnershipMask, own: Option<&(usize, Vec<usize>)>) {
         find_segmented(frame, &mut self.segmented);
         self.has_images |= !frame.images.is_empty();
-        self.is_masked = ownership.others > 0;
+        self.is_masked = ownership.others > 0 || own.is_some();
         if self.is_masked {
             self.masked.mask(frame, ownership);
         }
-    }
-
-    /// Treats pixels of the scene as possibly showing the body, in this frame.
-    pub(crate) fn release(&mut self, frame: &Frame, ownership: OwnershipMask, own: Own) {
-        if !self.is_masked {
-            self.masked.mask(frame, ownership);
+        if let Some((image, pixels)) = own {
+            self.masked.release(frame, *image, pixels);
         }
-        self.is_masked = true;
-        self.masked.release(frame, own);
     }
 
     /// Step 1 (K06 IV-B.1): keeps the points in the enlarged box of the whole body, without the scene and the pixels that other
@@ -137,12 +118,12 @@ mod tests {
         let observe = |observer: &mut Observer| {
             with_frame(&pixels, 0.0, |frame| {
                 let scene = wall(frame);
-                observer.begin(frame, everything(&scene));
+                observer.begin(frame, everything(&scene), None);
                 observer.gather(frame, Vec3::ZERO, &bounds, everything(&scene), &Config::default());
             });
         };
         observe(&mut observer);
-        observer.begin(&nothing, everything(&Backgrounds::default()));
+        observer.begin(&nothing, everything(&Backgrounds::default()), None);
         assert!(observer.silent(&nothing) && !with_frame(&pixels, 1.0, |frame| observer.silent(frame)));
         observer.clear();
         assert!(!observer.silent(&nothing) && observer.candidates.is_empty());

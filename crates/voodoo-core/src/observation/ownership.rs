@@ -8,10 +8,9 @@ pub(crate) const NO_OWNER: u16 = u16::MAX;
 /// A frame from the perspective of one of several persons.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OwnershipMask<'a> {
-    /// The owner of each pixel, image after image: the index of a person, or [`NO_OWNER`].
+    /// The owner of each pixel, image after image, and then of each point, cloud after cloud: the index of a person, or
+    /// [`NO_OWNER`].
     pub owners: &'a [Vec<u16>],
-    /// The owner of each point, cloud after cloud.
-    pub cloud_owners: &'a [Vec<u16>],
     /// Index of this person.
     pub own: u16,
     /// Number of other persons who may own pixels and points.

@@ -21,16 +21,11 @@ pub enum ColorPixels<'a> {
 
 impl ColorPixels<'_> {
     /// Number of pixels.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         match self {
             Self::Color(pixels) => pixels.len(),
             Self::Gray(pixels) => pixels.len(),
         }
-    }
-
-    /// True when there is no pixel.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// The color of a pixel.
@@ -63,7 +58,7 @@ impl ColorPixels<'_> {
 ///     number: 0,
 ///     source: 0,
 /// };
-/// Frame::empty(0.0).with_colors(&[image]).check(&Body::human(1.75, HumanModel::Measured)?, None)?;
+/// Frame { colors: &[image], ..Frame::empty(0.0) }.check(&Body::human(1.75, HumanModel::Measured)?, None)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug)]

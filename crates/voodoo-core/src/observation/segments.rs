@@ -1,5 +1,7 @@
 //! Cuts the foreground of a frame into connected segments: each may be a lost body.
 
+use std::cmp::Ordering;
+
 use crate::config::Config;
 use crate::math::{Aabb, Vec3};
 use crate::observation::background::Background;
@@ -26,7 +28,8 @@ pub(crate) struct Segment {
     pub patches: f64,
 }
 
-#[derive(Clone, Copy, Debug)]
+/// A sample of a surface. Samples are sorted by cell, and then by position, so that sums are the same in every run.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 struct Sample {
     key: u64,
     point: [f32; 3],
@@ -37,10 +40,8 @@ struct Sample {
 struct Cell {
     key: u64,
     samples: (u32, u32),
-    /// Union-find parent: another cell of the segment with a smaller index, or itself.
-    parent: u32,
-    /// Number of the segment, of a cell that is its own parent.
-    segment: u32,
+    /// Number of the segment, once it is known.
+    segment: Option<usize>,
 }
 
 /// Working memory, and the segments of the last frame, largest first.
@@ -48,6 +49,8 @@ struct Cell {
 pub(crate) struct Segments {
     samples: Vec<Sample>,
     cells: Vec<Cell>,
+    /// Cells of a segment whose neighbors have yet to be visited.
+    unvisited: Vec<usize>,
     /// The segments.
     pub found: Vec<Segment>,
 }
@@ -65,25 +68,16 @@ impl Segments {
                 self.push(point, cloud.weight * step as f64);
             }
         }
-        if !frame.excluded.is_empty() {
-            let inside = |sample: &Sample| {
-                let point = Vec3::from_array(sample.point.map(f64::from)) + origin;
-                frame.excluded.iter().any(|bounds| bounds.contains(point))
-            };
-            self.samples.retain(|sample| !inside(sample));
-        }
-        if let Some(ground) = frame.ground {
-            let floor = ground.relative_to(origin);
-            let height = |point: [f32; 3]| floor.height(Vec3::from_array(point.map(f64::from)));
-            self.samples.retain(|sample| height(sample.point) >= config.ground_clearance);
-        }
-        // An unstable sort needs no extra memory but does not keep the order of equal keys; sums must be the same in every run.
-        self.samples.sort_unstable_by(|a, b| {
-            let [first, second] = [a, b].map(|sample| sample.point.map(f64::from));
-            a.key.cmp(&b.key).then_with(|| order(&first, &second))
+        let floor = frame.ground.map(|ground| ground.relative_to(origin));
+        self.samples.retain(|sample| {
+            let point = sample.position();
+            let excluded = frame.excluded.iter().any(|bounds| bounds.contains(point + origin));
+            !excluded && floor.is_none_or(|floor| floor.height(point) >= config.ground_clearance)
         });
+        // An unstable sort needs no extra memory.
+        self.samples.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
         self.fill_cells();
-        self.join_cells();
+        self.number_cells();
         self.sum_up();
     }
 
@@ -93,8 +87,7 @@ impl Segments {
             return;
         }
         let key = ((cell.x as u64) << 42) | ((cell.y as u64) << 21) | cell.z as u64;
-        let point = point.to_array().map(|value| value as f32);
-        self.samples.push(Sample { key, point, weight: weight as f32 });
+        self.samples.push(Sample { key, point: point.as_vec3().to_array(), weight: weight as f32 });
     }
 
     fn sample_images(&mut self, views: DepthViews) {
@@ -121,54 +114,45 @@ impl Segments {
         for samples in self.samples.chunk_by(|a, b| a.key == b.key) {
             let end = start + samples.len() as u32;
             if samples.iter().map(|sample| sample.weight).sum::<f32>() >= LEAST_PATCHES {
-                let parent = self.cells.len() as u32;
-                self.cells.push(Cell { key: samples[0].key, samples: (start, end), parent, segment: 0 });
+                self.cells.push(Cell { key: samples[0].key, samples: (start, end), segment: None });
             }
             start = end;
         }
     }
 
-    /// Joins every cell with its adjacent ones. Testing half of the directions is enough: the other neighbors find this cell.
-    fn join_cells(&mut self) {
-        for index in 0..self.cells.len() {
-            let key = self.cells[index].key;
-            for neighbor in 14..27_i64 {
-                let offset = ((neighbor / 9 - 1) << 42) + ((neighbor / 3 % 3 - 1) << 21) + (neighbor % 3 - 1);
-                let key_beside = key.wrapping_add_signed(offset);
-                if let Ok(other) = self.cells.binary_search_by_key(&key_beside, |cell| cell.key) {
-                    let (a, b) = (self.first(index as u32), self.first(other as u32));
-                    self.cells[a.max(b) as usize].parent = a.min(b);
+    /// Numbers the segments in the order of their first cells, and tells every cell the number of its segment: that of the adjacent
+    /// ones.
+    fn number_cells(&mut self) {
+        let Self { cells, unvisited, found, .. } = self;
+        found.clear();
+        for index in 0..cells.len() {
+            if cells[index].segment.is_some() {
+                continue;
+            }
+            unvisited.push(index);
+            cells[index].segment = Some(found.len());
+            while let Some(cell) = unvisited.pop() {
+                for neighbor in 0..27_i64 {
+                    let offset = ((neighbor / 9 - 1) << 42) + ((neighbor / 3 % 3 - 1) << 21) + (neighbor % 3 - 1);
+                    let key_beside = cells[cell].key.wrapping_add_signed(offset);
+                    if let Ok(other) = cells.binary_search_by_key(&key_beside, |cell| cell.key)
+                        && cells[other].segment.is_none()
+                    {
+                        unvisited.push(other);
+                        cells[other].segment = Some(found.len());
+                    }
                 }
             }
-        }
-    }
-
-    /// The union-find root of a cell, with path compression.
-    fn first(&mut self, mut cell: u32) -> u32 {
-        loop {
-            let parent = self.cells[cell as usize].parent;
-            if parent == cell {
-                return cell;
-            }
-            let next = self.cells[parent as usize].parent;
-            self.cells[cell as usize].parent = next;
-            cell = next;
+            found.push(Segment { center: Vec3::ZERO, bounds: Aabb::EMPTY, patches: 0.0 });
         }
     }
 
     fn sum_up(&mut self) {
-        self.found.clear();
-        for index in 0..self.cells.len() {
-            let first = self.first(index as u32) as usize;
-            if first == index {
-                self.cells[index].segment = self.found.len() as u32;
-                self.found.push(Segment { center: Vec3::ZERO, bounds: Aabb::EMPTY, patches: 0.0 });
-            }
-            let segment = &mut self.found[self.cells[first].segment as usize];
-            let (start, end) = self.cells[index].samples;
-            for sample in &self.samples[start as usize..end as usize] {
-                let weight = f64::from(sample.weight);
-                let point = Vec3::from_array(sample.point.map(f64::from));
+        for Cell { samples: (start, end), segment, .. } in &self.cells {
+            let Some(number) = segment else { continue };
+            let segment = &mut self.found[*number];
+            for sample in &self.samples[*start as usize..*end as usize] {
+                let (point, weight) = (sample.position(), f64::from(sample.weight));
                 segment.center += weight * point;
                 segment.bounds = segment.bounds.union(Aabb::new(point, point));
                 segment.patches += weight;
@@ -177,15 +161,14 @@ impl Segments {
         for segment in &mut self.found {
             segment.center /= segment.patches;
         }
-        // No two segments have the same centroid, so the order is the same in every run.
-        let place = |segment: &Segment| segment.center.to_array();
-        self.found.sort_unstable_by(|a, b| b.patches.total_cmp(&a.patches).then_with(|| order(&place(a), &place(b))));
+        self.found.sort_by(|a, b| b.patches.total_cmp(&a.patches));
     }
 }
 
-fn order(a: &[f64; 3], b: &[f64; 3]) -> std::cmp::Ordering {
-    let axes = a.iter().zip(b).map(|(a, b)| a.total_cmp(b));
-    axes.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
+impl Sample {
+    fn position(&self) -> Vec3 {
+        Vec3::from_array(self.point.map(f64::from))
+    }
 }
 
 #[cfg(test)]

@@ -8,7 +8,6 @@ use crate::body::Body;
 use crate::detect::{Detected, DetectionQuery, PlacedDetection, Surroundings, fit_body};
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::{DepthImage, Frame, PositionRelation};
-use crate::observation::observer::Own;
 use crate::observation::ownership::NO_OWNER;
 
 /// Shortest time between two detections in pixels that no person explains, seconds, while anybody is tracked.
@@ -28,7 +27,7 @@ impl People {
             let place = fitted.ok().and_then(|(_, poses)| poses.first().map(|root| root.translation));
             if let Some(place) = place.filter(|place| self.is_requested(frame, *place)) {
                 self.tentative.update(TentativeTrack::given(frame.stamp, place, detection), None);
-                if self.detector.knows() && self.finds_new(frame.stamp) {
+                if self.detector.knows && self.finds_new(frame.stamp) {
                     self.detect(frame, DetectionQuery::Near(place));
                 }
             }
@@ -84,7 +83,7 @@ impl People {
         };
         if everybody_there
             || !self.finds_new(frame.stamp)
-            || !self.detector.knows()
+            || !self.detector.knows
             || self.last_detection.is_some_and(|last| frame.stamp - last < wait)
         {
             return;
@@ -101,7 +100,7 @@ impl People {
 
     /// Whether somebody may be in what does not move: before every view was searched, and while somebody is lost.
     fn searches_everywhere(&self, frame: &Frame) -> bool {
-        let searched = (0..frame.images.len()).all(|number| self.scene.is_old(number, frame.stamp));
+        let searched = frame.images.iter().all(|image| self.scene.is_old(image, frame.stamp));
         self.followed().is_none()
             && (!searched || self.persons.iter().any(|person| person.present && !person.is_tracked()))
     }
@@ -120,7 +119,7 @@ impl People {
             let mut newcomers = Vec::new();
             for next in 0..MOST_TOGETHER {
                 let Some(one) = found.get(next) else { break };
-                let detected = Detected { detection: &one.detection, map: self.detector.map() };
+                let detected = Detected { detection: &one.detection, map: &self.detector.map };
                 newcomers.extend(fit_body(&self.prototype, detected));
                 // Newcomers are numbered after all persons.
                 let (image, pixels) = (&frame.images[number], &one.detection.pixels);
@@ -146,7 +145,7 @@ impl People {
             excluded: frame.excluded,
             owners: self.assignment.owners.get(number).map_or(&[], Vec::as_slice),
             // A person may have stood there since the camera started, so only an old background is excluded.
-            background: if self.scene.is_old(number, frame.stamp) { scene } else { &[] },
+            background: if self.scene.is_old(image, frame.stamp) { scene } else { &[] },
             ..Surroundings::default()
         };
         let mut found = self.detector.detect(&self.prototype, image, &around, query);
@@ -267,7 +266,7 @@ impl People {
 
     /// Returns the detection of a tentative track.
     fn detected<'a>(&'a self, track: &'a TentativeTrack) -> Detected<'a> {
-        Detected { detection: &track.detection, map: self.detector.map() }
+        Detected { detection: &track.detection, map: &self.detector.map }
     }
 
     /// Returns the body of a tentative track, in its sizes, and its poses.
@@ -321,19 +320,19 @@ impl People {
 
     /// Starts a person's tracker at a tentative track, in the pixels whose owner is `own`. Returns whether the person is there.
     fn reactivate(&mut self, frame: &Frame, track: &TentativeTrack, number: usize, own: usize) -> bool {
-        self.scene.known.release(frame, Own { image: track.image, pixels: &track.detection.pixels });
+        self.scene.known.release(frame, track.image, &track.detection.pixels);
         let person = &mut self.persons[number];
         if !self.options.includes(person.id) {
             return false;
         }
         let known = person.created < frame.stamp;
         let ownership = self.assignment.ownership(own, &self.scene.known);
-        let detected = Detected { detection: &track.detection, map: self.detector.map() };
+        let detected = Detected { detection: &track.detection, map: &self.detector.map };
         let placed = PlacedDetection { index: 0, root: track.place, detection: track.detection.clone() };
         let depth_frame = &Frame { colors: &[], ..*frame };
         let came = if !track.positions.is_empty() {
-            let frame = depth_frame.with_positions(&track.positions);
-            person.tracker.start_at_positions(&frame, ownership, !known)
+            let frame = &Frame { positions: &track.positions, ..*depth_frame };
+            person.tracker.start_at_positions(frame, ownership, !known)
         } else if person.present {
             person.tracker.recover(depth_frame, ownership, placed)
         } else {
@@ -342,7 +341,7 @@ impl People {
         if came {
             person.present = true;
             person.created = person.created.min(frame.stamp);
-            person.update_stature(detected);
+            detected.stature().into_iter().for_each(|reported| person.stature.update(reported));
         }
         person.update(frame, ownership);
         // A lost person's own tracker may have found them in the same frame.

@@ -21,7 +21,6 @@ use crate::detect::{BoundDetector, Detect, DetectError};
 use crate::error::TrackError;
 use crate::math::Vec3;
 use crate::observation::frame::{DetectedPerson, Frame};
-use crate::observation::observer::Own;
 use crate::threads::Threads;
 use crate::tracker::BodyTracker;
 use births::NEW;
@@ -102,7 +101,7 @@ impl People {
 
     /// The error of a detector in the last step, if one failed: that of the shared detector, else that of a person's.
     pub fn detector_error(&self) -> Option<&DetectError> {
-        self.detector.error().or_else(|| self.persons.iter().find_map(|person| person.tracker.detector_error()))
+        self.detector.error.as_ref().or_else(|| self.persons.iter().find_map(|person| person.tracker.detector_error()))
     }
 
     /// Why somebody who was detected in the last step is not tracked; `None` if nobody was, or everybody is.
@@ -153,13 +152,6 @@ impl People {
         Ok(self.next_id - 1)
     }
 
-    /// Forgets everybody but the first person, and the scene. The next frame may have any stamp.
-    fn forget_others(&mut self) {
-        self.persons.truncate(1);
-        (self.scene, self.tentative) = Default::default();
-        (self.last_detection, self.stamp) = (None, None);
-    }
-
     /// Returns a person with the next number, who is not present yet.
     fn nobody_yet(&self, stamp: f64) -> Result<Person, TrackError> {
         let (body, config) = (self.prototype.clone(), self.config.clone());
@@ -179,16 +171,16 @@ impl People {
     fn advance(&mut self, frame: &Frame, own: &[(usize, Frame)]) {
         self.stamp = Some(frame.stamp);
         self.refusal = None;
-        self.detector.clear_error();
+        self.detector.error = None;
         if self.config.background {
-            self.scene.register(frame);
+            self.scene.known.register(frame);
         }
         self.assign_pixels(frame);
         let shown = self.match_detections(frame);
         self.follow(frame, own, &shown);
         for person in &self.persons {
-            if let Some((image, pixels)) = person.tracker.moved_to().filter(|_| person.present) {
-                self.scene.known.release(frame, Own { image, pixels });
+            if let Some((image, pixels)) = person.tracker.moved_to.as_ref().filter(|_| person.present) {
+                self.scene.known.release(frame, *image, pixels);
             }
         }
         // A lost person must not become part of the scene, and is searched for in the pixels assigned to them as well.
@@ -200,7 +192,10 @@ impl People {
         }
         self.prune_tracks();
         self.find_new(frame, &shown);
-        self.delete_expired(frame.stamp);
+        // Persons who have been absent for too long are deleted.
+        let forget_after = self.options.forget_after;
+        self.persons
+            .retain(|person| person.present || person.followed || frame.stamp - person.last_tracked < forget_after);
     }
 
     /// Assigns every pixel and free point to the person whose surface explains it.
@@ -273,12 +268,6 @@ impl People {
             let is_followed = self.options.allows(place) && self.options.includes(self.persons[newer].id);
             self.persons[newer].present &= is_followed;
         }
-    }
-
-    /// Deletes persons who have been absent for too long.
-    fn delete_expired(&mut self, stamp: f64) {
-        let forget_after = self.options.forget_after;
-        self.persons.retain(|person| person.present || person.followed || stamp - person.last_tracked < forget_after);
     }
 }
 

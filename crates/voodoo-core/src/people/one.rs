@@ -29,7 +29,7 @@ const AWAY: f64 = 1.0;
 /// tracker.reset_pose(&standing)?;
 /// for stamp in [0.00, 0.03, 0.06] {
 ///     let wrist = PositionRelation { site, position: marker, weight: 20.0, bias: 0.0, source: 0 };
-///     tracker.step(&Frame::empty(stamp).with_positions(&[wrist]))?;
+///     tracker.step(&Frame { positions: &[wrist], ..Frame::empty(stamp) })?;
 /// }
 /// assert!(tracker.estimate().sites[site].distance(marker) < 0.01);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -88,9 +88,12 @@ impl Tracker {
         Ok(self.restarted())
     }
 
-    /// Forgets everybody else, and the scene.
+    /// Forgets everybody else, and the scene. The next frame may have any stamp.
     fn restarted(&mut self) -> &Estimate {
-        self.people.forget_others();
+        let People { persons, scene, tentative, last_detection, stamp, .. } = &mut self.people;
+        persons.truncate(1);
+        (*scene, *tentative) = Default::default();
+        (*last_detection, *stamp) = (None, None);
         let person = self.followed();
         (person.present, person.stays) = (true, true);
         (person.created, person.last_tracked) = (f64::NEG_INFINITY, f64::NEG_INFINITY);

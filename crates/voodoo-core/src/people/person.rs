@@ -9,6 +9,7 @@ use crate::math::{Pose, Vec3};
 use crate::observation::frame::Frame;
 use crate::observation::ownership::OwnershipMask;
 use crate::relocalize::distance_cost;
+use crate::sizes::LengthEstimate;
 use crate::tracker::BodyTracker;
 use crate::tracker::estimate::Status;
 
@@ -41,8 +42,8 @@ pub(super) struct Person {
     counted: f64,
     /// Last tracked position of the root, world frame.
     pub(super) place: Vec3,
-    /// Natural logarithm of the detected stature and its variance: the mean of all detections, weighted by their variances.
-    stature: Option<[f64; 2]>,
+    /// The detected stature.
+    pub(super) stature: LengthEstimate,
     /// Colors of their clothes.
     pub(super) clothes: Clothes,
     last_clothes: f64,
@@ -71,7 +72,7 @@ impl Person {
             absence: 0.0,
             counted: f64::NEG_INFINITY,
             place: Vec3::ZERO,
-            stature: None,
+            stature: LengthEstimate::default(),
             clothes: Clothes::default(),
             last_clothes: f64::NEG_INFINITY,
             expected: Vec::new(),
@@ -88,25 +89,15 @@ impl Person {
         self.present && self.tracker.is_there()
     }
 
-    /// Updates the stature with a detection. The errors of successive detections are correlated, so the variance of the mean is
-    /// that of the best single detection.
-    pub(super) fn update_stature(&mut self, detected: Detected) {
-        let Some([log_stature, variance]) = stature(detected) else { return };
-        self.stature = Some(self.stature.map_or([log_stature, variance], |[known, before]| {
-            let gain = before / (before + variance);
-            [known + gain * (log_stature - known), before.min(variance)]
-        }));
-    }
-
     /// Returns the cost of the person's being at a position, nats.
     pub(super) fn distance_cost(&self, place: Vec3, stamp: f64) -> f64 {
         distance_cost(self.place.distance(place), stamp - self.last_tracked)
     }
 
-    /// Returns the cost of the detected stature for this person, nats.
+    /// Returns the cost of the detected stature for this person, nats: all sizes scale with the stature.
     pub(super) fn stature_cost(&self, detected: Detected) -> f64 {
-        let both = self.stature.zip(stature(detected));
-        both.map_or(0.0, |([own, a], [other, b])| 0.5 * (other - own).powi(2) / (a + b))
+        let Some([stature, sigma]) = detected.stature().filter(|_| self.stature.information > 0.0) else { return 0.0 };
+        0.5 * (stature.ln() - self.stature.mean).powi(2) / (1.0 / self.stature.information + sigma * sigma)
     }
 
     /// Updates the person after the tracker's step. A person who has been lost for too long becomes absent.
@@ -157,10 +148,4 @@ impl Person {
             _ => LEAVES,
         }
     }
-}
-
-/// Returns the natural logarithm of a detected person's stature, and its variance. All sizes scale with the stature.
-fn stature(detected: Detected) -> Option<[f64; 2]> {
-    let [length, sigma] = detected.detection.lengths.get(detected.map.stature?)?;
-    Some([length.ln(), sigma * sigma])
 }

@@ -31,9 +31,8 @@ pub(super) struct PredictedBody<'a> {
 pub(super) struct PixelAssignment {
     /// Numbers of the bodies that pixels and points were assigned to.
     assigned: Vec<u16>,
-    /// The owner of each pixel, image after image.
+    /// The owner of each pixel, image after image, and then of each point, cloud after cloud.
     pub(super) owners: Vec<Vec<u16>>,
-    cloud_owners: Vec<Vec<u16>>,
     distances: Vec<f32>,
     /// Depths of a row, meters.
     depth: Vec<f32>,
@@ -49,21 +48,19 @@ impl PixelAssignment {
     pub(super) fn ownership<'a>(&'a self, number: usize, scene: &'a Backgrounds) -> OwnershipMask<'a> {
         let own = number as u16;
         let others = self.assigned.iter().filter(|assigned| **assigned != own).count();
-        OwnershipMask { owners: &self.owners, cloud_owners: &self.cloud_owners, own, others, scene }
+        OwnershipMask { owners: &self.owners, own, others, scene }
     }
 
     /// Returns the number of pixels and free points that a person explains.
     pub(super) fn count(&self, number: usize) -> usize {
-        let owners = self.owners.iter().chain(&self.cloud_owners).flatten();
-        owners.filter(|owner| usize::from(**owner) == number).count()
+        self.owners.iter().flatten().filter(|owner| usize::from(**owner) == number).count()
     }
 
     /// Releases the pixels and free points that are assigned to the bodies with these numbers.
     pub(super) fn release(&mut self, numbers: impl RangeBounds<usize>) {
         let is_released = |owner: &u16| numbers.contains(&usize::from(*owner));
         if self.assigned.iter().any(is_released) {
-            let owners = self.owners.iter_mut().chain(&mut self.cloud_owners).flatten();
-            owners.filter(|owner| is_released(owner)).for_each(|owner| *owner = NO_OWNER);
+            self.owners.iter_mut().flatten().filter(|owner| is_released(owner)).for_each(|owner| *owner = NO_OWNER);
         }
     }
 
@@ -75,20 +72,20 @@ impl PixelAssignment {
         bodies: impl Iterator<Item = PredictedBody<'a>> + Clone,
     ) {
         refill(&mut self.assigned, bodies.clone().map(|body| body.number));
-        let [mut owners, mut cloud_owners] = [&mut self.owners, &mut self.cloud_owners].map(std::mem::take);
-        owners.resize_with(frame.images.len(), Vec::new);
-        for (image, owners) in frame.images.iter().zip(&mut owners) {
+        let mut owners = std::mem::take(&mut self.owners);
+        owners.resize_with(frame.images.len() + frame.clouds.len(), Vec::new);
+        let (of_images, of_clouds) = owners.split_at_mut(frame.images.len());
+        for (image, owners) in frame.images.iter().zip(of_images) {
             let background = scene.depth(image);
             let gather = |own: &mut Self, origin, bounds: &Aabb| own.gather(image, background, origin, bounds);
             self.assign_all(image.pixels.len(), bodies.clone(), owners, gather);
         }
-        cloud_owners.resize_with(frame.clouds.len(), Vec::new);
-        for (cloud, owners) in frame.clouds.iter().zip(&mut cloud_owners) {
+        for (cloud, owners) in frame.clouds.iter().zip(of_clouds) {
             let free = if cloud.scope == Scope::Free { cloud.points.len() } else { 0 };
             let gather = |own: &mut Self, origin, bounds: &Aabb| own.gather_cloud(cloud, origin, bounds);
             self.assign_all(free, bodies.clone(), owners, gather);
         }
-        (self.owners, self.cloud_owners) = (owners, cloud_owners);
+        self.owners = owners;
     }
 
     /// Assigns `count` pixels or points, which have no owner yet, to the body with the nearest surface; `gather` finds those in a

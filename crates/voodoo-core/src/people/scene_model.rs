@@ -23,47 +23,20 @@ const OLD: f64 = 3.0;
 /// Largest difference between equal depths, meters.
 const SAME: f32 = 0.05;
 
-/// The learned depth of the scene, and pending depths that may become part of it.
+/// The learned scene, and where it is learned next.
 #[derive(Debug, Default)]
 pub(super) struct SceneModel {
     /// The learned scene.
     pub(super) known: Backgrounds,
-    images: Vec<PendingDepth>,
     row: usize,
     /// Whether the last frame that was learned showed nobody new: nothing but persons and the known scene.
     pub(super) shows_nobody_new: bool,
 }
 
-/// Recent depth of each pixel where the scene is not known, or of the person there, and the number of consecutive observations.
-#[derive(Debug, Default)]
-struct PendingDepth {
-    depth: Vec<f32>,
-    frames: Vec<u8>,
-    /// Stamp since which the camera has been at its position, seconds; `None` in the first frame.
-    since: Option<f64>,
-    /// Whether the whole image of the second frame was learned.
-    filled: bool,
-}
-
 impl SceneModel {
-    /// Registers the images of a frame: of others nothing is learned. For a new camera, or one that moved far, the scene is unknown.
-    pub(super) fn register(&mut self, frame: &Frame) {
-        self.images.resize_with(frame.images.len(), PendingDepth::default);
-        for (image, tentative) in frame.images.iter().zip(&mut self.images) {
-            tentative.depth.resize(image.pixels.len(), 0.0);
-            tentative.frames.resize(image.pixels.len(), 0);
-        }
-        let images = &mut self.images;
-        self.known.register(frame, |number, carried| {
-            if !carried {
-                (images[number].since, images[number].filled) = (None, false);
-            }
-        });
-    }
-
     /// Whether the camera of an image has been at its position for long enough that its view was searched for persons.
-    pub(super) fn is_old(&self, image: usize, stamp: f64) -> bool {
-        self.images.get(image).and_then(|image| image.since).is_some_and(|since| stamp - since > OLD)
+    pub(super) fn is_old(&self, image: &DepthImage, stamp: f64) -> bool {
+        self.known.of_image(image).and_then(|known| known.since).is_some_and(|since| stamp - since > OLD)
     }
 
     /// Learns some rows in pixels that no person owns; the whole image in the second frame of a camera at its position.
@@ -71,17 +44,18 @@ impl SceneModel {
         self.row = (self.row + 1) % LEARNED_ROWS;
         // Pixels that were learned, and those of them that show neither a person nor the known scene.
         let (mut learned, mut unexplained) = (0, 0);
-        for ((image, tentative), owners) in frame.images.iter().zip(&mut self.images).zip(owners) {
-            let Some(known) = self.known.depth_mut(image) else { continue };
-            if tentative.since.is_none() {
-                tentative.since = Some(frame.stamp);
+        for (image, owners) in frame.images.iter().zip(owners) {
+            let Some(background) = self.known.of_image_mut(image) else { continue };
+            let Background { depth: known, pending, frames, since, filled, .. } = background;
+            if since.is_none() {
+                *since = Some(frame.stamp);
                 continue;
             }
-            let all = !std::mem::replace(&mut tentative.filled, true);
+            let all = !std::mem::replace(filled, true);
             if all {
                 for (index, owner) in owners.iter().enumerate() {
                     let z = image.depth(index).unwrap_or(0.0);
-                    let learned = if *owner == NO_OWNER { &mut known[index] } else { &mut tentative.depth[index] };
+                    let learned = if *owner == NO_OWNER { &mut known[index] } else { &mut pending[index] };
                     *learned = z;
                 }
             }
@@ -90,7 +64,12 @@ impl SceneModel {
                 let (mut new, mut width) = (0, 0.0);
                 for index in row * image.camera.width()..(row + 1) * image.camera.width() {
                     let seen = image.depth(index).filter(|_| owners[index] == NO_OWNER);
-                    match seen.filter(|z| is_new(known[index], tentative.depth[index], *z)) {
+                    // Something new is clearly before the known scene, or where nothing was seen before.
+                    let is_new = |z: &f32| {
+                        known[index] == 0.0 && pending[index] == 0.0
+                            || *z < known[index] - DEPTH_STEP && !Background::contains(known[index], *z)
+                    };
+                    match seen.filter(is_new) {
                         Some(z) => (new, width) = (new + 1, width + f64::from(z) / image.camera.focal()[0]),
                         None => (new, width) = (0, 0.0),
                     }
@@ -98,7 +77,7 @@ impl SceneModel {
                         unexplained += std::mem::take(&mut new);
                     }
                     let Some(z) = seen else { continue };
-                    learn_pixel(&mut known[index], &mut tentative.depth[index], &mut tentative.frames[index], z);
+                    learn_pixel(&mut known[index], &mut pending[index], &mut frames[index], z);
                 }
             }
         }
@@ -114,11 +93,6 @@ impl SceneModel {
         };
         2 * pixels.iter().filter(still).count() > pixels.len()
     }
-}
-
-/// Whether a return is clearly before the known scene, or where nothing was seen before.
-fn is_new(known: f32, tentative: f32, z: f32) -> bool {
-    known == 0.0 && tentative == 0.0 || z < known - DEPTH_STEP && !Background::contains(known, z)
 }
 
 fn learn_pixel(known: &mut f32, tentative: &mut f32, frames: &mut u8, z: f32) {
@@ -139,7 +113,6 @@ fn learn_pixel(known: &mut f32, tentative: &mut f32, frames: &mut u8, z: f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::observation::observer::Own;
     use crate::testing::with_frame;
 
     const PIXELS: usize = 160 * 124;
@@ -156,7 +129,7 @@ mod tests {
         check: impl FnOnce(&mut SceneModel, &Frame),
     ) {
         with_frame(&[millimeters; PIXELS], frame as f64 / 30.0, |frame| {
-            scene.register(frame);
+            scene.known.register(frame);
             check(scene, frame);
             scene.learn(frame, &[vec![owner; PIXELS]]);
         });
@@ -189,7 +162,7 @@ mod tests {
             let mut scene = SceneModel::default();
             (0..3).for_each(|frame| feed(&mut scene, 5000, frame, |_, _| ()));
             feed(&mut scene, came, 3, |scene, frame| {
-                scene.known.release(frame, Own { image: 0, pixels: &[7] });
+                scene.known.release(frame, 0, &[7]);
                 assert_eq!(scene.known.depth(&frame.images[0])[7..9], [left, 5.0]);
             });
         }

@@ -1,4 +1,5 @@
-//! Smoothed color histograms: 16 x 16 x 16 bins for color images, 256 for grayscale.
+//! Color models of limbs and their surroundings in the images of one camera: smoothed color histograms, of 16 x 16 x 16 bins for
+//! color images, 256 for grayscale.
 
 use crate::math::{refill, reset, vectorized};
 use crate::observation::picture::ColorPixels;
@@ -13,6 +14,9 @@ const SPREAD: f32 = 0.21;
 const GRAY_PASSES: usize = 40;
 /// Weight of a uniform distribution mixed into the histogram.
 const UNIFORM: f32 = 0.05;
+
+/// Weight of the new colors of two frames in the model of a limb, and in that of its surroundings: clothes stay the same.
+const RATES: [f32; 2] = [0.19, 0.36];
 
 /// Bound of the absolute log ratio: a color that was never observed before is weak evidence.
 pub(super) const MOST_RATIO: f32 = 2.0;
@@ -41,18 +45,14 @@ impl Kind {
     }
 }
 
-/// The bin of a color.
-#[inline(always)]
-pub(super) fn color_bin(pixel: [u8; 3]) -> usize {
-    let [x, y, z] = pixel.map(|value| usize::from(value >> (8 - BITS)));
-    (x * SIDE + y) * SIDE + z
-}
-
 /// The bin of a pixel.
 #[inline(always)]
 pub(super) fn bin_of(pixels: &ColorPixels, index: usize) -> usize {
     match pixels {
-        ColorPixels::Color(pixels) => color_bin(pixels[index]),
+        ColorPixels::Color(pixels) => {
+            let [x, y, z] = pixels[index].map(|value| usize::from(value >> (8 - BITS)));
+            (x * SIDE + y) * SIDE + z
+        }
         ColorPixels::Gray(pixels) => usize::from(pixels[index]),
     }
 }
@@ -114,6 +114,39 @@ impl ColorHistogram {
         self.known = true;
         self.counts.fill(0.0);
         self.counted = 0.0;
+    }
+}
+
+/// Colors by group of limbs: the left and the right limb of a pair share one model.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ColorModel {
+    pub kind: Kind,
+    pub limbs: Vec<ColorHistogram>,
+    pub around: Vec<ColorHistogram>,
+    room: Vec<f32>,
+}
+
+impl ColorModel {
+    /// Clears all colors.
+    pub(super) fn clear(&mut self, kind: Kind, groups: usize) {
+        self.kind = kind;
+        for histograms in [&mut self.limbs, &mut self.around] {
+            histograms.resize_with(groups, ColorHistogram::default);
+            histograms.iter_mut().for_each(|histogram| histogram.clear(kind));
+        }
+    }
+
+    /// Updates the models with the counted colors.
+    pub(super) fn learn(&mut self) {
+        let Self { kind, limbs, around, room } = self;
+        for (histograms, rate) in [limbs, around].into_iter().zip(RATES) {
+            histograms.iter_mut().for_each(|histogram| histogram.learn(*kind, rate, room));
+        }
+    }
+
+    /// Whether the colors of a group and of its surroundings are known.
+    pub(super) fn knows(&self, group: usize) -> bool {
+        self.limbs[group].known && self.around[group].known
     }
 }
 

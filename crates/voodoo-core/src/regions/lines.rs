@@ -1,12 +1,11 @@
 //! Lines across the contour of limbs: their positions in an image, and what borders the limb there.
 
 use super::labels::{LimbLabels, NOTHING};
+use super::scan::LineEdge;
 use crate::body::Body;
 use crate::camera::{Camera, NEAREST_RETURN};
 use crate::math::{Pose, Vec3};
-use crate::observation::depth_view::{DepthView, Pixel};
-use crate::observation::frame::Frame;
-use crate::observation::picture::ColorImage;
+use crate::observation::frame::DepthImage;
 
 /// Points on the rim of a free end.
 const RIM: usize = 8;
@@ -40,37 +39,14 @@ pub(super) struct Line {
     pub both: bool,
     /// Whether something other than the body occludes it.
     pub hidden: bool,
+    /// The edge that was found on it.
+    pub edge: Option<LineEdge>,
 }
 
 /// A depth camera within this distance of another camera has the same view, meters.
-const SAME_VIEW: f64 = 0.15;
+pub(super) const SAME_VIEW: f64 = 0.15;
 /// A measurement nearer than a limb by more than this occludes it, meters: the limbs may not have converged yet.
 const BEFORE_BY: f64 = 0.15;
-
-/// A depth camera beside a color camera: it measures what occludes the body.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct OcclusionDepth<'a> {
-    view: DepthView<'a>,
-    depth_from_camera: Pose,
-}
-
-impl<'a> OcclusionDepth<'a> {
-    /// The depth camera beside the camera of an image, if the frame has one.
-    pub(super) fn new(frame: &Frame<'a>, picture: &ColorImage) -> Option<Self> {
-        let place = picture.world_from_sensor.translation;
-        let near = |pose: &Pose| pose.translation.distance(place) < SAME_VIEW;
-        let image = frame.images.iter().find(|image| near(&image.world_from_sensor))?;
-        let working_from_camera = image.world_from_sensor;
-        let view = DepthView { image, background: &[], working_from_camera, segmented: false };
-        Some(Self { view, depth_from_camera: working_from_camera.inverse() * picture.world_from_sensor })
-    }
-
-    /// Whether something occludes a point in the camera frame.
-    fn is_occluded(&self, point: Vec3) -> bool {
-        let point = self.depth_from_camera * point;
-        matches!(self.view.at(point), Pixel::Foreground(depth) if depth < point.z - BEFORE_BY)
-    }
-}
 
 /// Data for placing the lines of a limb.
 pub(super) struct Viewer<'a> {
@@ -79,7 +55,9 @@ pub(super) struct Viewer<'a> {
     pub labels: &'a LimbLabels,
     /// Pixels per unit.
     pub unit: f32,
-    pub beside: Option<OcclusionDepth<'a>>,
+    pub world_from_camera: Pose,
+    /// The image of a depth camera beside the camera, if the frame has one: it measures what occludes the body.
+    pub depth: Option<&'a DepthImage<'a>>,
 }
 
 impl Viewer<'_> {
@@ -140,7 +118,8 @@ impl Viewer<'_> {
         let place = self.camera.project(point)?.map(|value| value as f32);
         let (normal, motion) = (n.map(|value| value as f32), self.camera.gradient(point, n)?);
         let (outside, depth, clear) = self.border(limb, place, normal)?;
-        let hidden = self.beside.is_some_and(|beside| beside.is_occluded(point));
+        let measured = self.depth.and_then(|depth| depth.measured(self.world_from_camera * point));
+        let hidden = measured.is_some_and(|[depth, expected]| depth > 0.0 && depth < expected - BEFORE_BY);
         Some(Line {
             limb: limb as u16,
             foot,
@@ -154,6 +133,7 @@ impl Viewer<'_> {
             clear: clear && !hidden,
             both: false,
             hidden,
+            edge: None,
         })
     }
 

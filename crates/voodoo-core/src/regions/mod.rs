@@ -10,7 +10,6 @@ mod evidence;
 mod histogram;
 mod labels;
 mod lines;
-mod models;
 mod pixel_gain;
 mod posterior;
 mod scan;
@@ -24,12 +23,12 @@ use crate::observation::frame::Frame;
 use crate::observation::picture::{ColorImage, ColorPixels};
 use empty_scene::EmptyScene;
 use evidence::Evidence;
-use histogram::Kind;
+use histogram::{ColorModel, Kind};
 use labels::LimbLabels;
-use lines::{Line, OcclusionDepth, Viewer};
-use models::ColorModel;
+use lines::{Line, SAME_VIEW, Viewer};
 use pixel_gain::camera_from_limb_at;
 use scan::{EdgeSearch, ScanView};
+use std::collections::BTreeMap;
 
 /// The edge search of each step of a frame: wide and coarse at first, then narrower and finer.
 const SEARCHES: [EdgeSearch; STEPS] = [
@@ -54,15 +53,12 @@ const FOCAL: f64 = 520.0;
 /// What was learned from the images of one camera, and working memory.
 #[derive(Debug, Default)]
 struct Learned {
-    number: u16,
     /// Pixels per unit in the last image.
     unit: f32,
     model: ColorModel,
     scene: Option<EmptyScene>,
     labels: LimbLabels,
     lines: Vec<Line>,
-    /// The edge found on each line.
-    edges: Vec<Option<scan::LineEdge>>,
     known: bool,
 }
 
@@ -72,7 +68,8 @@ pub(crate) const STEPS: usize = 4;
 /// Colors of the body and its surroundings for each camera, and the lines of the last search.
 #[derive(Debug, Default)]
 pub(crate) struct ColorRegions {
-    cameras: Vec<Learned>,
+    /// By number of the camera.
+    cameras: BTreeMap<u16, Learned>,
     /// Group of every limb: the limbs of one group have the same colors.
     groups: Vec<u16>,
     /// Time of the last frame, seconds.
@@ -123,7 +120,7 @@ pub(crate) struct Posed<'a> {
 /// for stamp in [0.0, 0.03] {
 ///     let pixels = ColorPixels::Color(&red_on_gray);
 ///     let image = ColorImage { pixels, camera: &camera, world_from_sensor, stamp, number: 0, source: 0 };
-///     tracker.step(&Frame::empty(stamp).with_colors(&[image]))?;
+///     tracker.step(&Frame { colors: &[image], ..Frame::empty(stamp) })?;
 /// }
 /// let near = tracker.region_lines(0).filter(|line| line.sigma.is_finite() && line.offset.abs() < 3.0); // pixels
 /// assert!(near.count() > 50);
@@ -147,7 +144,7 @@ impl ColorRegions {
     /// Resets the learned colors of bodies and surroundings.
     pub(crate) fn clear(&mut self) {
         (self.stamp, self.turn) = (None, 0);
-        self.cameras.iter_mut().for_each(|camera| camera.known = false);
+        self.cameras.values_mut().for_each(|camera| camera.known = false);
     }
 
     /// Sets the empty scene of a camera from images with their heights and widths; without images, removes it.
@@ -157,7 +154,7 @@ impl ColorRegions {
         pictures: &[(ColorPixels, [usize; 2])],
     ) -> Result<(), TrackError> {
         let scene = if pictures.is_empty() { None } else { Some(EmptyScene::from_pictures(pictures)?) };
-        self.camera(camera).scene = scene;
+        self.cameras.entry(camera).or_default().scene = scene;
         Ok(())
     }
 
@@ -167,7 +164,7 @@ impl ColorRegions {
             let expected = "a pinhole camera: take the distortion out of the picture";
             let (what, lens) = (format_args!("color[{index}].camera"), picture.camera.lens());
             TrackError::unless(!picture.camera.distorts(), what, expected, format_args!("{lens:?}"))?;
-            let known = self.cameras.iter().find(|camera| camera.number == picture.number);
+            let known = self.cameras.get(&picture.number);
             known.and_then(|camera| camera.scene.as_ref()).map_or(Ok(()), |scene| scene.check(picture, index))?;
         }
         Ok(())
@@ -177,12 +174,12 @@ impl ColorRegions {
     pub(crate) fn begin(&mut self, posed: Posed) {
         if self.groups != posed.body.roles().groups() {
             posed.body.roles().groups().clone_into(&mut self.groups);
-            self.cameras.iter_mut().for_each(|camera| camera.known = false);
+            self.cameras.values_mut().for_each(|camera| camera.known = false);
         }
         for picture in posed.frame.colors {
             let kind = Kind::new(&picture.pixels);
             let groups = self.groups.iter().map(|group| usize::from(*group) + 1).max().unwrap_or(0);
-            let camera = self.camera(picture.number);
+            let camera = self.cameras.entry(picture.number).or_default();
             if camera.known && camera.model.kind == kind {
                 continue;
             }
@@ -226,25 +223,21 @@ impl ColorRegions {
         for picture in posed.frame.colors {
             self.place_lines(picture, posed);
             let Self { cameras, groups, evidence, .. } = self;
-            let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.number && camera.known) else {
-                continue;
-            };
-            let mut edges = std::mem::take(&mut camera.edges);
-            let (unit, lines, view) = (camera.unit, &camera.lines, camera.view(picture, &camera.labels, groups));
+            let Some(camera) = cameras.get_mut(&picture.number).filter(|camera| camera.known) else { continue };
+            let mut lines = std::mem::take(&mut camera.lines);
+            let (unit, view) = (camera.unit, ScanView { picture, camera, labels: &camera.labels, groups });
             let working_from_camera = shifted(&picture.world_from_sensor, posed.origin);
-            edges.clear();
-            edges.reserve(lines.capacity());
             pairs.reserve(lines.capacity());
-            for line in lines {
+            for line in &mut lines {
                 let limb = usize::from(line.limb);
                 let searched = is_requested.is_none_or(|is_requested| is_requested(limb));
                 let found = if searched { scan::edge_on(&view, line, search, together) } else { None };
-                edges.push(found);
+                line.edge = found;
                 if together {
                     let length = posed.body.limbs()[limb].shape.length();
                     evidence[limb].take(line.foot.z / length, found.map(|found| found.beside));
                 }
-                let Some(edge) = found.map(|found| found.edge).filter(|edge| edge.information > 0.0) else { continue };
+                let Some(edge) = found.filter(|edge| edge.information > 0.0) else { continue };
                 let motion = line.motion / f64::from(unit);
                 let slope = motion.length();
                 pairs.push(RegionPair {
@@ -256,23 +249,22 @@ impl ColorRegions {
                     source: picture.source,
                 });
             }
-            camera.edges = edges;
+            camera.lines = lines;
         }
     }
 
     /// The lines of the last search in a camera's image.
     pub(crate) fn lines(&self, camera: u16) -> impl Iterator<Item = RegionLine> + '_ {
-        let camera = self.cameras.iter().find(|known| known.number == camera);
-        camera.into_iter().flat_map(|camera| {
+        self.cameras.get(&camera).into_iter().flat_map(|camera| {
             let unit = camera.unit;
-            camera.lines.iter().zip(&camera.edges).map(move |(line, found)| {
-                let edge = found.map(|found| found.edge).unwrap_or_default();
+            camera.lines.iter().map(move |line| {
+                let [mean, information] = line.edge.map_or([0.0; 2], |edge| [edge.mean, edge.information]);
                 RegionLine {
                     limb: usize::from(line.limb),
                     place: line.place,
                     normal: line.normal,
-                    offset: unit * edge.mean,
-                    sigma: unit / edge.information.sqrt(),
+                    offset: unit * mean,
+                    sigma: unit / information.sqrt(),
                 }
             })
         })
@@ -286,28 +278,23 @@ impl ColorRegions {
         self.stamp = Some(frame.stamp);
     }
 
-    fn camera(&mut self, number: u16) -> &mut Learned {
-        let index = self.cameras.iter().position(|camera| camera.number == number).unwrap_or_else(|| {
-            self.cameras.push(Learned { number, ..Learned::default() });
-            self.cameras.len() - 1
-        });
-        &mut self.cameras[index]
-    }
-
     /// Places the lines of one image.
     fn place_lines(&mut self, picture: &ColorImage, posed: Posed) {
         let limb = camera_from_limb_at(self.stamp, picture, posed);
         let mut camera_from_limb = std::mem::take(&mut self.camera_from_limb);
         refill(&mut camera_from_limb, (0..posed.poses.len()).map(limb));
         let [fx, fy] = picture.camera.focal();
-        let (body, Learned { unit, labels, lines, .. }) = (posed.body, self.camera(picture.number));
+        let body = posed.body;
+        let Learned { unit, labels, lines, .. } = self.cameras.entry(picture.number).or_default();
         *unit = (0.5 * (fx + fy) / FOCAL) as f32;
         labels.draw(body, &camera_from_limb, picture.camera, CELL_BITS, |_| true);
         lines.clear();
         // Reserves the full capacity at once: the number of lines differs from pose to pose.
         lines.reserve(2 * MOST_LINES * camera_from_limb.len());
-        let beside = OcclusionDepth::new(posed.frame, picture);
-        let viewer = Viewer { body, camera: picture.camera, labels, unit: *unit, beside };
+        let (camera, world_from_camera) = (picture.camera, picture.world_from_sensor);
+        let beside = |pose: &Pose| pose.translation.distance(world_from_camera.translation) < SAME_VIEW;
+        let depth = posed.frame.images.iter().find(|image| beside(&image.world_from_sensor));
+        let viewer = Viewer { body, camera, labels, unit: *unit, world_from_camera, depth };
         for (limb, pose) in camera_from_limb.iter().enumerate() {
             let lines_a_side = (body.limbs()[limb].shape.length() / SPACING).round() as usize;
             viewer.add(limb, pose, lines_a_side.clamp(LEAST_LINES, MOST_LINES), lines);
@@ -318,7 +305,7 @@ impl ColorRegions {
     /// Learns the colors along the lines of one image, except those of limbs with weak evidence.
     fn teach(&mut self, picture: &ColorImage) {
         let Self { cameras, groups, evidence, .. } = self;
-        let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.number) else { return };
+        let Some(camera) = cameras.get_mut(&picture.number) else { return };
         let unit = camera.unit;
         // When the evidence is weak for many limbs at once, the light has changed.
         let light = evidence.iter().filter(|evidence| evidence.is_weak()).count() > MANY;
@@ -330,12 +317,5 @@ impl ColorRegions {
             }
         }
         camera.model.learn();
-    }
-}
-
-impl Learned {
-    /// What is known of this camera's image, behind and beside the limbs that are drawn in `labels`.
-    fn view<'a>(&'a self, picture: &'a ColorImage, labels: &'a LimbLabels, groups: &'a [u16]) -> ScanView<'a> {
-        ScanView { picture, model: &self.model, labels, scene: self.scene.as_ref(), groups, unit: self.unit }
     }
 }

@@ -6,6 +6,7 @@
 use super::histogram::{MOST_RATIO, bin_of};
 use super::labels::{LimbLabels, NOTHING};
 use super::lines::NEARER_BY;
+use super::scan::ScanView;
 use super::{ColorRegions, Posed};
 use crate::association::correspondence::RegionSupport;
 use crate::body::two_bone::TwoBone;
@@ -53,9 +54,9 @@ impl ColorRegions {
         let shape = &posed.body.limbs()[limb].shape;
         let group = usize::from(self.groups[limb]);
         for (picture, labels) in posed.frame.colors.iter().zip(&self.backdrop) {
-            let known = self.cameras.iter().find(|camera| camera.number == picture.number && camera.known);
-            let Some(camera) = known.filter(|camera| camera.model.knows(group)) else { continue };
-            let view = camera.view(picture, labels, &self.groups);
+            let known = self.cameras.get(&picture.number);
+            let Some(camera) = known.filter(|camera| camera.known && camera.model.knows(group)) else { continue };
+            let view = ScanView { picture, camera, labels, groups: &self.groups };
             let camera_from_limb = camera_from_limb_at(self.stamp, picture, posed)(limb);
             places(shape, &camera_from_limb, picture.camera, |[u, v], depth, area| {
                 all += area;

@@ -5,19 +5,13 @@ const TEMPERATURE: f32 = 8.0;
 /// Greatest distance of the search from the expected edge, samples.
 pub(super) const MOST_REACH: usize = 10;
 
-/// Position of an edge, in samples outward from the expected edge.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct ColorEdge {
-    /// Mean.
-    pub mean: f32,
-    /// One over the variance of the posterior, minus the information of the search bounds alone.
-    pub information: f32,
-}
-
-/// Estimates the edge within `reach` samples of the middle. `near` are the log ratios halfway between the integer positions from
-/// `-reach` to `reach`. If the opposite contour of the limb is visible too, `far` are the log ratios there; otherwise the limb
-/// continues. Samples between the two ranges belong to the limb for any displacement. A sample represents `every` pixels.
-pub(super) fn edge(near: &[f32], far: Option<&[f32]>, reach: usize, every: f32) -> ColorEdge {
+/// Estimates the edge within `reach` samples of the middle: returns the mean of its posterior, in units outward from the expected
+/// edge, and its information: one over the variance of the posterior, minus the information of the search bounds alone.
+///
+/// `near` are the log ratios halfway between the integer positions from `-reach` to `reach`. If the opposite contour of the limb is
+/// visible too, `far` are the log ratios there; otherwise the limb continues. Samples between the two ranges belong to the limb for
+/// any displacement. A sample represents `every` units.
+pub(super) fn edge(near: &[f32], far: Option<&[f32]>, reach: usize, every: f32) -> [f32; 2] {
     let count = 2 * reach + 1;
     let mut sums = [0.0_f32; 2 * MOST_REACH + 1];
     let sums = &mut sums[..count];
@@ -42,9 +36,9 @@ pub(super) fn edge(near: &[f32], far: Option<&[f32]>, reach: usize, every: f32) 
     let flat = (count * count - 1) as f32 / 12.0;
     let information = 1.0 / variance - 1.0 / flat;
     if information <= 0.0 {
-        return ColorEdge::default();
+        return [0.0; 2];
     }
     // The search bounds pull the mean to the middle; without their effect it lies farther out.
     let most = reach as f32;
-    ColorEdge { mean: (mean / (variance * information)).clamp(-most, most), information }
+    [every * (mean / (variance * information)).clamp(-most, most), information / (every * every)]
 }

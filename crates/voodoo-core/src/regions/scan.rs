@@ -1,11 +1,11 @@
 //! Samples images along lines: log ratios of limb and surroundings, and colors to learn.
 
+use super::Learned;
 use super::empty_scene::EmptyScene;
-use super::histogram::{bin_of, clamped, color_bin};
+use super::histogram::{ColorModel, bin_of, clamped};
 use super::labels::{LimbLabels, NOTHING};
 use super::lines::{BESIDE, Line, NEARER_BY};
-use super::models::ColorModel;
-use super::posterior::{ColorEdge, MOST_REACH, edge};
+use super::posterior::{MOST_REACH, edge};
 use crate::camera::Camera;
 use crate::observation::picture::{ColorImage, ColorPixels};
 
@@ -35,17 +35,19 @@ pub(super) struct EdgeSearch {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ScanView<'a> {
     pub picture: &'a ColorImage<'a>,
-    pub model: &'a ColorModel,
+    /// What is known of its camera.
+    pub camera: &'a Learned,
+    /// The limbs that are behind and beside the line.
     pub labels: &'a LimbLabels,
-    pub scene: Option<&'a EmptyScene>,
     pub groups: &'a [u16],
-    pub unit: f32,
 }
 
 /// Result of the search on a line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LineEdge {
-    pub edge: ColorEdge,
+    /// Position, units outward from the expected edge, and its information.
+    pub mean: f32,
+    pub information: f32,
     /// Mean log ratios inside and outside of the contour.
     pub beside: [f32; 2],
 }
@@ -53,7 +55,9 @@ pub(super) struct LineEdge {
 /// Finds the edge on a line; `None` where there is no evidence.
 pub(super) fn edge_on(view: &ScanView, line: &Line, search: EdgeSearch, together: bool) -> Option<LineEdge> {
     let group = view.group(line.limb);
-    if !line.clear || !view.model.knows(group) || view.outside_is(line, group) {
+    // A neighbor outside of the contour may have the same colors as the limb.
+    let alike = line.outside != NOTHING && view.group(line.outside) == group;
+    if !line.clear || !view.camera.model.knows(group) || alike {
         return None;
     }
     let EdgeSearch { reach, every } = search;
@@ -65,29 +69,17 @@ pub(super) fn edge_on(view: &ScanView, line: &Line, search: EdgeSearch, together
     let mut ratios = [0.0; 4 * MOST_REACH];
     let ratios = &mut ratios[..far + span];
     if far == width {
-        fill_ratios(view, line, [start - far as f32, every], ratios);
+        view.fill(line, [start - far as f32, every], ratios);
     } else {
-        fill_ratios(view, line, [start - width as f32, every], &mut ratios[..far]);
-        fill_ratios(view, line, [start, every], &mut ratios[far..]);
+        view.fill(line, [start - width as f32, every], &mut ratios[..far]);
+        view.fill(line, [start, every], &mut ratios[far..]);
     }
     let (inside, outside) = ratios.split_at(far + reach);
     let mean = |ratios: &[f32]| ratios.iter().sum::<f32>() / ratios.len() as f32;
     let next = NEXT_TO.min(reach);
     let beside = [mean(&inside[inside.len() - next..]), mean(&outside[..next])];
-    let found = edge(&ratios[far..], (width > 0).then(|| &ratios[..span]), reach, every);
-    let edge = ColorEdge { mean: every * found.mean, information: found.information / (every * every) };
-    Some(LineEdge { edge, beside })
-}
-
-/// Fills `ratios` with log ratios at samples outward, `every` units apart, the first at `start` samples.
-fn fill_ratios(view: &ScanView, line: &Line, [start, every]: [f32; 2], ratios: &mut [f32]) {
-    match view.picture.pixels {
-        ColorPixels::Color(pixels) => view.fill(line, [start, every], ratios, |pixel| color_bin(pixels[pixel])),
-        ColorPixels::Gray(pixels) => {
-            view.fill(line, [start, every], ratios, |pixel| usize::from(pixels[pixel]));
-            compare_locally(view, line, [start, every], ratios);
-        }
-    }
+    let [mean, information] = edge(&ratios[far..], (width > 0).then(|| &ratios[..span]), reach, every);
+    Some(LineEdge { mean, information, beside })
 }
 
 /// Distribution of brightness beside the contour: a Gaussian (R07).
@@ -118,17 +110,17 @@ impl Local {
 /// Gray values alone hardly identify a whole limb: each ratio is averaged with the log ratio of the local brightness beside the
 /// contour.
 fn compare_locally(view: &ScanView, line: &Line, [start, every]: [f32; 2], ratios: &mut [f32]) {
-    let picture = view.picture;
+    let (picture, unit) = (view.picture, view.camera.unit);
     let side = |from: f32, to: f32| {
         let steps = (to - from).max(0.0) as usize;
-        let walk = Walk::new(picture, line, from * view.unit, view.unit).take(steps);
+        let walk = Walk::new(picture, line, from * unit, unit).take(steps);
         Local::fit(walk.flatten().map(|(column, row)| brightness(picture, column, row)))
     };
     let (inside, outside) = (side(-line.width.min(LOCAL), -1.0), side(1.0, LOCAL));
     if inside.count < 3.0 || outside.count < 3.0 {
         return;
     }
-    let walk = Walk::new(picture, line, start * every * view.unit, every * view.unit);
+    let walk = Walk::new(picture, line, start * every * unit, every * unit);
     for (ratio, pixel) in ratios.iter_mut().zip(walk) {
         if let Some((column, row)) = pixel.filter(|_| *ratio != 0.0) {
             let value = brightness(picture, column, row);
@@ -147,49 +139,42 @@ impl ScanView<'_> {
         usize::from(self.groups[usize::from(limb)])
     }
 
-    /// Whether the neighbor outside the contour has the same colors as the limb.
-    fn outside_is(&self, line: &Line, group: usize) -> bool {
-        line.outside != NOTHING && self.group(line.outside) == group
-    }
-
-    /// Fills `ratios` with log ratios at samples outward, the first at `start` samples; `bin` returns the bin of a pixel.
-    #[inline(always)]
-    fn fill(&self, line: &Line, [start, every]: [f32; 2], ratios: &mut [f32], bin: impl Fn(usize) -> usize) {
-        let (model, group) = (self.model, self.group(line.limb));
-        let known = model.ratios(group);
+    /// Fills `ratios` with log ratios at samples outward, `every` units apart, the first at `start` samples.
+    fn fill(&self, line: &Line, [start, every]: [f32; 2], ratios: &mut [f32]) {
+        let group = self.group(line.limb);
         let mut r = start * every;
-        let walk = Walk::new(self.picture, line, r * self.unit, every * self.unit);
+        let unit = self.camera.unit;
+        let walk = Walk::new(self.picture, line, r * unit, every * unit);
         for (ratio, pixel) in ratios.iter_mut().zip(walk) {
             *ratio = 0.0;
             if let Some((column, row)) = pixel
                 && let Some(other) = self.other(line, r, column, row)
             {
                 let pixel = row * self.picture.camera.width() + column;
-                let bin = bin(pixel);
-                *ratio = if other == NOTHING && self.scene.is_none() {
-                    known[bin]
-                } else {
-                    self.ratio(group, other, pixel, bin)
-                };
+                *ratio = self.ratio(group, other, pixel, bin_of(&self.picture.pixels, pixel));
             }
             r += every;
+        }
+        if let ColorPixels::Gray(_) = self.picture.pixels {
+            compare_locally(self, line, [start, every], ratios);
         }
     }
 
     /// Log ratio of a pixel with the given bin, between a group's colors and those of what would be visible without the limb.
     #[inline(always)]
     pub(super) fn ratio(&self, group: usize, other: u16, pixel: usize, bin: usize) -> f32 {
-        let own = self.model.limbs[group].log[bin];
+        let Learned { model, scene, .. } = self.camera;
+        let own = model.limbs[group].log[bin];
         if other == NOTHING {
-            let around = self.model.around[group].log[bin];
+            let around = model.around[group].log[bin];
             let log = |scene: &EmptyScene| scene.log(pixel, self.picture.pixels.get(pixel), around);
-            return clamped(own - self.scene.map_or(around, log));
+            return clamped(own - scene.as_ref().map_or(around, log));
         }
         let other = self.group(other);
-        if other == group || !self.model.limbs[other].known {
+        if other == group || !model.limbs[other].known {
             return 0.0;
         }
-        clamped(own - self.model.limbs[other].log[bin])
+        clamped(own - model.limbs[other].log[bin])
     }
 
     /// What would be visible at `r` units outward without the limb; `None` where something occludes it.

@@ -5,6 +5,7 @@
 
 use super::histogram::bin_of;
 use super::labels::NOTHING;
+use super::scan::ScanView;
 use super::{ColorRegions, Posed};
 use crate::association::correspondence::Correspondences;
 use crate::observation::picture::ColorImage;
@@ -37,8 +38,8 @@ impl ColorRegions {
         self.place_lines(picture, posed);
         let [width, height] = [picture.camera.width(), picture.camera.height()];
         let mut likely = vec![0.0; width * height];
-        let Some(camera) = self.cameras.iter().find(|camera| camera.number == picture.number) else { return likely };
-        let view = camera.view(picture, &camera.labels, &self.groups);
+        let Some(camera) = self.cameras.get(&picture.number) else { return likely };
+        let view = ScanView { picture, camera, labels: &camera.labels, groups: &self.groups };
         let cell = 1_usize << super::CELL_BITS;
         let cells = distances(&camera.labels, cell as f32 / camera.unit);
         let nearest = |index: usize| cells[index / width / cell * width.div_ceil(cell) + index % width / cell];

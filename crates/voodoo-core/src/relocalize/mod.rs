@@ -16,7 +16,7 @@ use crate::fit::{Context, Fit, UNKNOWN_MOTION};
 use crate::math::{Aabb, Pose, Vec3, refill, shifted};
 use crate::observation::candidates::{Candidates, body_box};
 use crate::observation::frame::{Frame, Ground};
-use crate::observation::observer::Own;
+use crate::observation::observer::Observation;
 use crate::observation::ownership::OwnershipMask;
 use crate::observation::segments::Segments;
 use crate::tracker::estimate::Status;
@@ -77,7 +77,7 @@ impl Relocalizer {
     /// Compares the detection of this frame with a body at these poses, working frame, whose origin is at `origin` in the world.
     pub(crate) fn compare(&mut self, body: &Body, poses: &[Pose], origin: Vec3) -> Option<DetectionVerdict> {
         let Self { detector, detection, check, .. } = self;
-        let detected = Detected { detection: &detection.as_ref()?.detection, map: detector.map() };
+        let detected = Detected { detection: &detection.as_ref()?.detection, map: &detector.map };
         Some(check.compare(detected, body, poses, origin))
     }
 
@@ -89,7 +89,8 @@ impl Relocalizer {
         let Some(mut place) = fit_pose(&context.model.body, detected) else { return false };
         place.iter_mut().for_each(|pose| *pose = shifted(pose, origin));
         let margin = context.config.body_box_margin;
-        let there = Aabb::new(detected.detection.low - origin, detected.detection.high - origin).enlarged(margin);
+        let Aabb { mins, maxs } = detected.detection.bounds;
+        let there = Aabb::new(mins - origin, maxs - origin).enlarged(margin);
         // Points that the present pose explains must not be left unexplained, unless the body is `lost` there.
         let here = if lost { there } else { body_box(&context.model.body, present, margin) };
         let bounds = there.union(here);
@@ -97,7 +98,7 @@ impl Relocalizer {
         self.check.elsewhere = 0.0;
         fit.swap_matches(&mut self.matched);
         self.candidates.gather(context.observation.views, &bounds, context.config);
-        let observation = context.observation.with(&self.candidates);
+        let observation = Observation { candidates: &self.candidates, ..context.observation };
         // Before its first frame the body is where it was set, and what is beside it may be scene.
         let first = context.previous.is_empty();
         let mut fitted = present.to_vec();
@@ -136,13 +137,13 @@ impl Relocalizer {
 
     /// Returns the detection of this frame, if there is one.
     pub(crate) fn detected(&self) -> Option<Detected<'_>> {
-        self.detection.as_ref().map(|detection| Detected { detection: &detection.detection, map: self.detector.map() })
+        self.detection.as_ref().map(|detection| Detected { detection: &detection.detection, map: &self.detector.map })
     }
 
-    /// Returns the pixels of the detection.
-    pub(crate) fn own_pixels(&self) -> Own<'_> {
-        let pixels = self.detection.as_ref().map_or(&[][..], |detection| &detection.detection.pixels);
-        Own { image: self.image, pixels }
+    /// Returns the index of the image and the pixels of the detection.
+    pub(crate) fn own_pixels(&self) -> (usize, Vec<usize>) {
+        let found = self.detection.as_ref();
+        (self.image, found.map_or_else(Vec::new, |found| found.detection.pixels.clone()))
     }
 
     /// Records how the track was started: `auto_initialized` by the detector, whose detection tells the floor, or by the user.
@@ -161,7 +162,7 @@ impl Relocalizer {
         reasons: Reasons,
     ) {
         self.forget();
-        if !self.check.is_due(frame.stamp, reasons, ownership.others) || !self.detector.knows() {
+        if !self.check.is_due(frame.stamp, reasons, ownership.others) || !self.detector.knows {
             return;
         }
         let query = if reasons.anywhere { DetectionQuery::Any } else { DetectionQuery::Near(root) };

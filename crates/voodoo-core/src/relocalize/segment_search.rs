@@ -8,6 +8,7 @@ use crate::fit::{Context, Fit, UNKNOWN_MOTION};
 use crate::hypotheses::SWIVELS;
 use crate::math::{Pose, Quat, Vec3, refill};
 use crate::observation::candidates::body_box;
+use crate::observation::observer::Observation;
 use crate::observation::segments::Segment;
 
 impl Relocalizer {
@@ -15,7 +16,7 @@ impl Relocalizer {
     /// `present`. The matches of `fit` are restored before it returns.
     pub(crate) fn search(&mut self, context: Context, fit: &mut Fit, present: &[Pose]) -> bool {
         let views = context.observation.views;
-        if self.detector.knows() && !views.frame.images.is_empty() {
+        if self.detector.knows && !views.frame.images.is_empty() {
             return false;
         }
         self.segments.find(views, context.config);
@@ -36,7 +37,7 @@ impl Relocalizer {
         }
         let bounds = segment.bounds.enlarged(context.config.body_box_margin);
         candidates.gather(context.observation.views, &bounds, context.config);
-        let observation = context.observation.with(candidates);
+        let observation = Observation { candidates, ..context.observation };
         let at = Context { observation, previous: &[], time_scale: UNKNOWN_MOTION, ..context };
         let stood = tracked.first().map_or(Vec3::Z, |root| root.rotation * Vec3::Z);
         let up = observation.frame().ground.map_or(stood, |ground| ground.normal);

@@ -195,7 +195,7 @@ pub(super) fn first_system(
     working_from_limb: &Pose,
     edges: &[DepthEdge],
 ) -> Option<GirthSystem> {
-    let (points, _) = matches.accepted();
+    let points = matches.accepted();
     if points < ENOUGH {
         return None;
     }

@@ -16,6 +16,7 @@ use girth::{
     ASIDE_SIGMA, FOUND_SHARE, GIRTH_STEPS, Girth, GirthPrior, TIP_FACTORS, first_system, follow_girth, side_system,
     start_girth,
 };
+pub(crate) use reported::LengthEstimate;
 use reported::ReportedLengths;
 
 /// Points farther than this from the given pose are not used for the sizes, meters.
@@ -40,22 +41,22 @@ pub(crate) enum Start {
 #[derive(Debug, Default)]
 pub(crate) struct Sizes {
     open: bool,
-    /// The pose was not set exactly, so it is fitted before the girths are.
-    rough: bool,
-    /// The body as it was set, unless its sizes are known.
-    set: Option<Body>,
+    /// Whether the pose was not set exactly, so that it is fitted before the girths are, and the sizes were found with it.
+    pub rough: bool,
+    /// The body as it was set, before frames changed its sizes; `None` where these are known, so that no frame changes them.
+    pub set: Option<Body>,
     /// Girth estimates; empty when the girths were given.
     girths: Vec<Girth>,
     /// Girth estimates from color edges.
     color_girths: ColorGirths,
-    /// Groups of limbs with a common length, the factor by which each was lengthened since the sizes were set, and buffers for
-    /// the next change and its prior.
-    pairs: Vec<Pair>,
+    /// Groups of limbs with a common length that is refined; empty where the lengths are known.
+    pub pairs: Vec<Pair>,
+    /// The factor by which each group was lengthened since the sizes were set, and buffers for the next change and its prior.
     stretched: Vec<f64>,
     change: Vec<f64>,
     pull: Vec<f64>,
     /// Lengths reported by detections of an auto-initialized body.
-    reported: ReportedLengths,
+    pub reported: ReportedLengths,
 }
 
 impl Sizes {
@@ -77,29 +78,14 @@ impl Sizes {
     /// Updates the reported lengths with a detection if the body was auto-initialized: lengths are pulled towards the mean of all
     /// reports.
     pub(crate) fn update(&mut self, detected: Detected) {
-        if self.found_with_pose() {
+        if self.rough {
             self.reported.update(detected);
         }
-    }
-
-    /// Whether the detector reported sizes of an auto-initialized body that are still uncertain.
-    pub(crate) fn is_uncertain(&self, map: &JointMap) -> bool {
-        self.reported.is_uncertain(map)
     }
 
     /// Whether the sizes have yet to be fitted and the pose has to be fitted first.
     pub(crate) fn wait_for_pose(&self) -> bool {
         self.open && self.rough
-    }
-
-    /// Whether the sizes were found together with the pose because the user gave none.
-    pub(crate) fn found_with_pose(&self) -> bool {
-        self.rough
-    }
-
-    /// Groups of limbs with a common length that is refined; empty where the lengths are known.
-    pub(crate) fn refined_pairs(&self) -> &[Pair] {
-        &self.pairs
     }
 
     /// Standard deviation of the mean radius of a limb, meters; NaN where it was given.
@@ -113,16 +99,6 @@ impl Sizes {
     pub(crate) fn set_radius_sigmas(&self, body: &Body, fit: &mut Fit) {
         let sigma = |limb| if self.rough { self.girth_sigma(body, limb) } else { f64::NAN };
         fit.set_radius_sigmas((0..body.limbs().len()).map(sigma));
-    }
-
-    /// Whether the sizes are known, so that no frame changes them.
-    pub(crate) fn known(&self) -> bool {
-        self.set.is_none()
-    }
-
-    /// The body as it was set, before frames changed its sizes.
-    pub(crate) fn initial_body(&self) -> Option<&Body> {
-        self.set.as_ref()
     }
 
     /// Takes over limbs that the user changed: their girths count as given, and the lengths are refined from the new ones.

@@ -10,36 +10,42 @@ const KNOWN: f64 = 0.03;
 
 /// Running estimates of the logarithms of lengths, in the detector's order.
 #[derive(Debug, Default)]
-pub(super) struct ReportedLengths(Vec<LengthEstimate>);
+pub(crate) struct ReportedLengths(Vec<LengthEstimate>);
 
-/// Estimate of the logarithm of one length.
+/// Estimate of the logarithm of one length. Errors of detections of one person are correlated, so all detections together have only
+/// the information of the most precise one.
 #[derive(Clone, Copy, Debug, Default)]
-struct LengthEstimate {
+pub(crate) struct LengthEstimate {
     /// Value of the first detection, from which the sizes were set.
     set: f64,
-    /// Mean over all detections, and the information of the most precise one.
-    mean: f64,
-    information: f64,
+    /// Mean over all detections.
+    pub(crate) mean: f64,
+    /// Information of the most precise detection; 0 before the first one.
+    pub(crate) information: f64,
+}
+
+impl LengthEstimate {
+    /// Updates the estimate with a length, meters, and its relative standard deviation.
+    pub(crate) fn update(&mut self, [length, sigma]: [f64; 2]) {
+        let (length, information, before) = (length.ln(), 1.0 / (sigma * sigma), self.information);
+        if before == 0.0 {
+            (self.set, self.mean) = (length, length);
+        }
+        self.mean += (length - self.mean) * information / (information + before);
+        self.information = information.max(before);
+    }
 }
 
 impl ReportedLengths {
-    /// Updates the estimates with the lengths of a detection and their relative standard deviations. Errors of detections of one
-    /// person are correlated, so all earlier detections together have only the information of the most precise one.
+    /// Updates the estimates with the lengths of a detection and their relative standard deviations.
     pub(super) fn update(&mut self, detected: Detected) {
         let (Self(lengths), reported) = (self, &detected.detection.lengths);
         lengths.resize(lengths.len().max(reported.len()), LengthEstimate::default());
-        for ([length, sigma], known) in reported.iter().zip(lengths) {
-            let (length, information, before) = (length.ln(), 1.0 / (sigma * sigma), known.information);
-            if before == 0.0 {
-                (known.set, known.mean) = (length, length);
-            }
-            known.mean += (length - known.mean) * information / (information + before);
-            known.information = information.max(before);
-        }
+        lengths.iter_mut().zip(reported).for_each(|(known, reported)| known.update(*reported));
     }
 
     /// Whether the stature was reported, but with a standard deviation above `KNOWN`.
-    pub(super) fn is_uncertain(&self, map: &JointMap) -> bool {
+    pub(crate) fn is_uncertain(&self, map: &JointMap) -> bool {
         let stature = map.stature.and_then(|stature| self.0.get(stature));
         stature.is_some_and(|stature| stature.information > 0.0 && stature.information < 1.0 / (KNOWN * KNOWN))
     }

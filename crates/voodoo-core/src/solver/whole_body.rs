@@ -137,7 +137,7 @@ impl WholeBody {
         let mut all_points = 0.0;
         for (limb, part) in body.limbs().iter().enumerate() {
             let motion = part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion);
-            let points = correspondences.limbs[limb].total_weight();
+            let points = correspondences.limbs[limb].weighed().0;
             all_points += points;
             // A limb that is hardly visible stays near its prediction: a few stray points must not move it.
             let measured = points + self.sites[limb] + self.edges[limb];
@@ -164,7 +164,7 @@ impl WholeBody {
         for leg in extremities.iter().filter(|chain| chain.leg) {
             let trunk = body.parent(leg.upper).map_or(Quat::IDENTITY, |trunk| predicted[trunk].rotation);
             let rotations = leg.turned(body, trunk, leg.standing(body, predicted, floor));
-            let shown = |limb: &usize| correspondences.limbs[*limb].total_weight() + self.edges[*limb];
+            let shown = |limb: &usize| correspondences.limbs[*limb].weighed().0 + self.edges[*limb];
             let mut measured = leg.ends.iter().map(shown).sum::<f64>();
             for (limb, rotation) in [leg.lower, leg.upper].into_iter().zip(rotations.into_iter().rev()) {
                 measured += shown(&limb);

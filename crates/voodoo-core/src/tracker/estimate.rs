@@ -98,7 +98,7 @@ pub struct SourceReport {
 ///     PositionRelation { site, position, weight: 20.0, bias: 0.0, source: 0 }
 /// };
 /// let markers: Vec<_> = (0..body.sites().len()).map(marker).collect();
-/// let estimate = tracker.step(&Frame::empty(0.0).with_positions(&markers))?;
+/// let estimate = tracker.step(&Frame { positions: &markers, ..Frame::empty(0.0) })?;
 ///
 /// assert_eq!(estimate.status, Status::Tracking);
 /// assert_eq!(estimate.limb_status[body.limb_index("l_forearm")?], LimbStatus::Measured);
@@ -184,8 +184,8 @@ impl Estimate {
         estimate.joint_gaps.clear();
         for (index, limb) in body.limbs().iter().enumerate() {
             let matches = correspondences.limbs.get(index);
-            let (count, sum) = matches.map_or((0, 0.0), |matches| matches.accepted());
-            let weight = matches.map_or(0.0, |matches| matches.total_weight());
+            let count = matches.map_or(0, |matches| matches.accepted());
+            let (weight, sum) = matches.map_or((0.0, 0.0), |matches| matches.weighed());
             estimate.limb_points.push(count);
             estimate.limb_residual.push((sum / weight).sqrt());
             estimate.joint_gaps.push(limb.parent.as_ref().map_or(0.0, |(parent, joint)| {

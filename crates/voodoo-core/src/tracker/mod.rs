@@ -15,7 +15,7 @@ use crate::hypotheses::Hypotheses;
 use crate::math::{Pose, Vec3, refill};
 use crate::observation::candidates::body_box;
 use crate::observation::frame::{Frame, check_poses};
-use crate::observation::observer::{Observer, Own};
+use crate::observation::observer::Observer;
 use crate::observation::ownership::OwnershipMask;
 use crate::relocalize::{DetectionVerdict, Reasons, Relocalizer, distance_cost, trunk_is_elsewhere};
 use crate::sizes::{Sizes, Start};
@@ -59,8 +59,8 @@ pub struct BodyTracker {
     estimate: Estimate,
     /// The estimate before that one.
     before: Estimate,
-    /// Index of the image and pixels of the detection to which the body was moved in this frame.
-    moved_to: Option<(usize, Vec<usize>)>,
+    /// Index of the image and pixels of the detection to which the body was moved in this frame: they show no scene.
+    pub(crate) moved_to: Option<(usize, Vec<usize>)>,
 }
 
 impl BodyTracker {
@@ -90,12 +90,12 @@ impl BodyTracker {
 
     /// Whether the tracker searches for the body while it has no pose: it has a detector that supports this body.
     pub fn can_search(&self) -> bool {
-        self.relocalizer.detector.knows()
+        self.relocalizer.detector.knows
     }
 
     /// The error of the detector in the last step, if it failed. The step then ran without detections.
     pub(crate) fn detector_error(&self) -> Option<&DetectError> {
-        self.relocalizer.detector.error()
+        self.relocalizer.detector.error.as_ref()
     }
 
     /// Sets the pose, and with `fit_sizes` the sizes, from positions of named sites (index of the site, world position). Sizes
@@ -131,7 +131,7 @@ impl BodyTracker {
     /// Updates the pose with the pixels and points of a frame, which the caller has checked, that show this body or nobody (K06
     /// IV-B). A body without a pose stays without.
     pub(crate) fn step(&mut self, frame: &Frame, ownership: OwnershipMask) {
-        self.relocalizer.detector.clear_error();
+        self.relocalizer.detector.error = None;
         self.moved_to = None;
         if self.is_started() {
             std::mem::swap(&mut self.before, &mut self.estimate);
@@ -147,9 +147,9 @@ impl BodyTracker {
     /// Restarts the track at the current detection, in the sizes that were set or, where they clearly differ, in the detected
     /// ones. Returns whether it could.
     fn restart_at_detection(&mut self) -> bool {
-        let set = self.sizes.initial_body().unwrap_or(&self.model.body);
+        let set = self.sizes.set.as_ref().unwrap_or(&self.model.body);
         let Some((body, poses, _)) = self.relocalizer.fit_detected(&self.model, Some(set)) else { return false };
-        self.restart_fitted(body, poses, self.sizes.known(), self.relocalizer.check.auto_initialized);
+        self.restart_fitted(body, poses, self.sizes.set.is_none(), self.relocalizer.check.auto_initialized);
         true
     }
 
@@ -237,7 +237,7 @@ impl BodyTracker {
         }
         let origin = motion.origin;
         let root = origin + motion.expect(&model.body, frame.stamp, config.prediction)[0].translation;
-        let suspect = hypotheses.has_excess() || sizes.is_uncertain(relocalizer.detector.map());
+        let suspect = hypotheses.has_excess() || sizes.reported.is_uncertain(&relocalizer.detector.map);
         let reasons = Reasons {
             uncertain: suspect || assessor.is_uncertain(&model.extremities),
             anywhere: interrupted,
@@ -287,10 +287,7 @@ impl BodyTracker {
         // Predicted pose, and candidates around it (step 1 of K06 IV-B).
         let time_scale = motion.advance(&model.body, frame.stamp, config.prediction, whole_body);
         let Motion { poses, previous, predicted, origin, .. } = motion;
-        observer.begin(frame, ownership);
-        if let Some((image, pixels)) = moved_to {
-            observer.release(frame, ownership, Own { image: *image, pixels });
-        }
+        observer.begin(frame, ownership, moved_to.as_ref());
         let bounds = body_box(&model.body, poses, config.body_box_margin);
         let observation = observer.gather(frame, *origin, &bounds, ownership, config);
         let setting = Setting { config, observation, previous, time_scale };
@@ -316,7 +313,7 @@ impl BodyTracker {
         }
         // Refinement of the sizes with this frame.
         let lost = assessor.status == Status::Lost;
-        sizes.refine_lengths(setting, model, poses, predicted, fit, relocalizer.detector.map(), lost);
+        sizes.refine_lengths(setting, model, poses, predicted, fit, &relocalizer.detector.map, lost);
         if whole_body {
             sizes.refine_girths(setting, model, poses, fit, |limb| assessor.is_reliable(limb));
         }
@@ -351,8 +348,8 @@ impl BodyTracker {
     /// Whether the body explains the frame better at the current detection than where it is expected.
     fn is_at_detection(&mut self, frame: &Frame, ownership: OwnershipMask) -> bool {
         let Self { config, model, motion, observer, fit, relocalizer, assessor, .. } = self;
-        observer.begin(frame, ownership);
-        observer.release(frame, ownership, relocalizer.own_pixels());
+        let own = relocalizer.own_pixels();
+        observer.begin(frame, ownership, Some(&own));
         let observation = observer.observation(frame, motion.origin, ownership);
         let previous = if motion.stamp.is_some() { &motion.poses[..] } else { &[] };
         let context = Context { config, model, observation, previous, time_scale: 1.0 };
@@ -360,8 +357,7 @@ impl BodyTracker {
         fit.forget_detected();
         let is_there = relocalizer.try_detected(context, fit, &motion.predicted, lost);
         if is_there {
-            let Own { image, pixels } = relocalizer.own_pixels();
-            self.moved_to = Some((image, pixels.to_vec()));
+            self.moved_to = Some(own);
         }
         is_there
     }
@@ -372,7 +368,7 @@ impl BodyTracker {
         if !relocalizer.is_searching() {
             return;
         }
-        observer.begin(frame, ownership);
+        observer.begin(frame, ownership, None);
         let observation = observer.observation(frame, motion.origin, ownership);
         let context = Context { config, model, observation, previous: &[], time_scale: 1.0 };
         if relocalizer.search(context, fit, &motion.predicted) {
@@ -394,7 +390,7 @@ impl BodyTracker {
         self.moved_to = None;
         let Motion { poses, predicted, .. } = &mut self.motion;
         std::mem::swap(poses, predicted);
-        self.observer.begin(frame, ownership);
+        self.observer.begin(frame, ownership, None);
         self.reassess(frame, ownership);
         false
     }
@@ -408,11 +404,6 @@ impl BodyTracker {
         fit.match_all(context, poses, config.max_steps, true);
         assessor.moved();
         assessor.assess(context, &fit.correspondences, poses, None);
-    }
-
-    /// Index of the image and pixels of the detection to which the body was moved in this frame: they show no scene.
-    pub(crate) fn moved_to(&self) -> Option<(usize, &[usize])> {
-        self.moved_to.as_ref().map(|(image, pixels)| (*image, pixels.as_slice()))
     }
 
     /// Fills the estimate: for a frame `time_scale` after the last one, or, with `None`, for a pose that was set.
@@ -429,7 +420,7 @@ impl BodyTracker {
             return;
         };
         let (body, poses, correspondences) = (&model.body, &motion.poses, &fit.correspondences);
-        let (pairs, sizes_found) = (sizes.refined_pairs(), sizes.found_with_pose());
+        let (pairs, sizes_found) = (sizes.pairs.as_slice(), sizes.rough);
         let found = FittedPose { model, poses, correspondences, pairs, sizes_found, time_scale, config };
         let branch_distance = |limb: usize| {
             let length = body.limbs()[limb].shape.length();

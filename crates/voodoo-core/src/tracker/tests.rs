@@ -45,7 +45,7 @@ fn a_body_that_sites_miss_by_far_is_not_tracked_whatever_depth_says() {
                 crate::PositionRelation { site, position, weight: 0.1, bias: 0.0, source: 1 }
             })
             .collect();
-        with_frame(&pixels, 0.1, |frame| tracker.step(&frame.with_positions(&places)).unwrap().status)
+        with_frame(&pixels, 0.1, |frame| tracker.step(&Frame { positions: &places, ..*frame }).unwrap().status)
     };
     assert_eq!([0.0, 0.08, 0.3].map(status), [Status::Tracking, Status::Tracking, Status::Degraded]);
 }

@@ -64,7 +64,7 @@ fn with_views<T>(shots: &[(Vec<u16>, Pose)], ask: impl FnOnce(DepthViews) -> T) 
             source: 0,
         })
         .collect();
-    let frame = Frame::empty(0.0).with_images(&images);
+    let frame = Frame { images: &images, ..Frame::empty(0.0) };
     let mut segmented = Vec::new();
     find_segmented(&frame, &mut segmented);
     ask(DepthViews { frame: &frame, backgrounds: &Backgrounds::default(), segmented: &segmented, origin: Vec3::ZERO })

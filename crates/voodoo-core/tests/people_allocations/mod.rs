@@ -47,7 +47,7 @@ impl TwoPersons {
         let mut counts = [0, 0];
         for index in 0..200 {
             let images = [CAMERA.image(&self.pixels)];
-            let frame = Frame::empty(index as f64 / 100.0).with_images(&images);
+            let frame = Frame { images: &images, ..Frame::empty(index as f64 / 100.0) };
             let before = allocations_so_far();
             people.step(&frame, &[]).unwrap();
             if index >= 140 {

@@ -95,7 +95,7 @@ pub(crate) fn surface_points(
 
 /// A frame with one free cloud.
 pub(crate) fn with_cloud<'a>(stamp: f64, clouds: &'a [Cloud<'a>]) -> Frame<'a> {
-    Frame::empty(stamp).with_clouds(clouds)
+    Frame { clouds, ..Frame::empty(stamp) }
 }
 
 /// Free points of weight 1 in the world frame.

@@ -303,6 +303,7 @@ mod tests {
     use crate::fit::Fit;
     use crate::observation::candidates::Candidates;
     use crate::observation::frame::Frame;
+    use crate::observation::observer::Observation;
     use crate::testing::{before_wall, depth, first_arm, moved, put_board, standing, with_context, without_background};
 
     /// Assesses poses in one image, for the given number of frames.
@@ -396,7 +397,7 @@ mod tests {
         assert_eq!(reported(&assessor).status, Status::Tracking);
         with_context(&pixels, &without_background(), &model, &poses, |context| {
             let (frame, candidates) = (Frame::empty(1.0), Candidates::default());
-            let mut observation = context.observation.with(&candidates);
+            let mut observation = Observation { candidates: &candidates, ..context.observation };
             (observation.views.frame, observation.views.segmented) = (&frame, &[]);
             assessor.assess(Context { observation, ..context }, &Correspondences::default(), &poses, None);
         });
