@@ -81,6 +81,7 @@ mod tests {
         all.limbs.resize_with(poses.len(), LimbMatches::default);
         for (limb, matches) in all.limbs.iter_mut().enumerate() {
             matches.weight = vec![0.5; 3 * limb];
+            matches.surface.signed_distance = vec![0.0; 3 * limb];
         }
         all.add_bands(&body, &poses, 0.4, &mut Vec::new());
         let joints: usize =
