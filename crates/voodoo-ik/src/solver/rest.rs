@@ -38,6 +38,7 @@ impl IkSolver {
     /// Takes one step with `h` at most `most`. Returns the largest change of an unknown; zero if no step is accepted.
     fn pull_once(&mut self, problem: &IkProblem, most: f64, angles: &mut [f64]) -> f64 {
         let (n, count, limits) = (angles.len(), self.levels.ranges.len(), problem.model.limits());
+        let goals_only = problem.without_images();
         angles.clone_into(&mut self.phase_start);
         let off = rest_error(problem, angles);
         self.objections.clear();
@@ -52,12 +53,12 @@ impl IkSolver {
                     angles[i] = (self.phase_start[i] + fraction * self.stages[count * n + i]).clamp(*low, *high);
                 }
                 problem.model.normalize(angles);
-                self.evaluate_here(problem, false, angles);
-                let kept = self.correct_upper_levels(problem, count, false, angles);
+                self.evaluate_here(&goals_only, angles);
+                let kept = self.correct_upper_levels(&goals_only, count, angles);
                 self.objections.truncate(refused * n);
                 if kept && rest_error(problem, angles) < off {
                     if problem.criterion.is_some() {
-                        self.evaluate_here(problem, true, angles);
+                        self.evaluate_here(problem, angles);
                     }
                     if self.here.h <= most {
                         let moves = angles.iter().zip(&self.phase_start).map(|(new, old)| (new - old).abs());
@@ -71,7 +72,7 @@ impl IkSolver {
                     break;
                 }
             }
-            self.evaluate_here(problem, true, angles);
+            self.evaluate_here(problem, angles);
             // If the images rejected even the smallest step, continues along the border of the region where they are satisfied.
             if self.objections.len() == refused * n {
                 return 0.0;
