@@ -17,40 +17,21 @@ const FOOT_ERROR: f32 = 3e-8;
 /// ratio.
 const CONDITIONED: f32 = DISTINCT as f32;
 
-/// One block of points, structure of arrays.
-#[derive(Clone, Copy)]
-pub(super) struct Block<const N: usize> {
-    pub x: [f32; N],
-    pub y: [f32; N],
-    pub z: [f32; N],
-}
-
-impl<const N: usize> Block<N> {
-    pub(super) const ZERO: Self = Self { x: [0.0; N], y: [0.0; N], z: [0.0; N] };
-
-    pub(super) fn get(&self, at: usize) -> [f32; 3] {
-        [self.x[at], self.y[at], self.z[at]]
-    }
-}
+/// One block of points, axis by axis.
+pub(super) type Block<const N: usize> = [[f32; N]; 3];
 
 /// The results of one block, in the frame of the queries.
 pub(super) struct BlockResult<const N: usize> {
     pub points: Block<N>,
     pub normals: Block<N>,
+    /// NaN where the result is not settled.
     pub signed_distance: [f32; N],
-    pub region: [u8; N],
-    /// Not zero where the exact path must compute the result.
-    pub unsettled: [u8; N],
+    pub region: [Region; N],
 }
 
 impl<const N: usize> BlockResult<N> {
-    pub(super) const ZERO: Self = Self {
-        points: Block::ZERO,
-        normals: Block::ZERO,
-        signed_distance: [0.0; N],
-        region: [0; N],
-        unsettled: [0; N],
-    };
+    pub(super) const ZERO: Self =
+        Self { points: [[0.0; N]; 3], normals: [[0.0; N]; 3], signed_distance: [0.0; N], region: [Region::Side; N] };
 }
 
 /// Shape and pose in single precision, as needed by the kernel.
@@ -104,23 +85,19 @@ impl Constants {
 
     /// Transforms a query into the limb frame.
     #[inline(always)]
-    fn in_limb<const FMA: bool>(&self, x: f32, y: f32, z: f32) -> (f32, f32, f32) {
-        let (wx, wy, wz) = (x - self.origin[0], y - self.origin[1], z - self.origin[2]);
-        let turn = |axis: usize| {
+    fn in_limb<const FMA: bool>(&self, query: [f32; 3]) -> [f32; 3] {
+        let [x, y, z] = [0, 1, 2].map(|axis| query[axis] - self.origin[axis]);
+        [0, 1, 2].map(|axis| {
             let [cx, cy, cz] = self.columns[axis];
-            fma::<FMA>(cx, wx, fma::<FMA>(cy, wy, fma::<FMA>(cz, wz, -self.rest[axis])))
-        };
-        (turn(0), turn(1), turn(2))
+            fma::<FMA>(cx, x, fma::<FMA>(cy, y, fma::<FMA>(cz, z, -self.rest[axis])))
+        })
     }
 
-    /// One coordinate of a limb-frame vector in the frame of the queries, added to `base`.
+    /// A limb-frame vector in the frame of the queries, added to `base`.
     #[inline(always)]
-    fn in_world<const FMA: bool>(&self, axis: usize, x: f32, y: f32, z: f32, base: f32) -> f32 {
-        fma::<FMA>(
-            self.columns[0][axis],
-            x,
-            fma::<FMA>(self.columns[1][axis], y, fma::<FMA>(self.columns[2][axis], z, base)),
-        )
+    fn in_world<const FMA: bool>(&self, [x, y, z]: [f32; 3], base: [f32; 3]) -> [f32; 3] {
+        let [cx, cy, cz] = self.columns;
+        [0, 1, 2].map(|axis| fma::<FMA>(cx[axis], x, fma::<FMA>(cy[axis], y, fma::<FMA>(cz[axis], z, base[axis]))))
     }
 
     /// Semi-axes of the slice at height `z`, clamped to the ends.
@@ -163,7 +140,7 @@ struct LaneFoot {
 }
 
 #[inline(always)]
-fn foot<const FMA: bool>(k: &Constants, c: f32, s: f32, x: f32, y: f32, z: f32) -> LaneFoot {
+fn foot<const FMA: bool>(k: &Constants, c: f32, s: f32, [x, y, z]: [f32; 3]) -> LaneFoot {
     let (dx, dy) = (k.da * c, k.db * s);
     let along = fma::<FMA>(dx, dx, fma::<FMA>(dy, dy, k.length * k.length));
     let inverse = 1.0 / along;
@@ -214,7 +191,7 @@ fn turned<const FMA: bool>(c: f32, s: f32, step: f32) -> (f32, f32) {
 
 /// The start angle: the direction `(x/a, y/b)` in the slice, then one step over the evolute of the slice.
 #[inline(always)]
-fn first_angle<const FMA: bool>(k: &Constants, x: f32, y: f32, z: f32) -> (f32, f32) {
+fn first_angle<const FMA: bool>(k: &Constants, [x, y, z]: [f32; 3]) -> (f32, f32) {
     let (a, b) = k.slice::<FMA>(z);
     let tiny = 1e-18;
     let (c, s) = unit::<FMA>(max(x * b, tiny), max(y * a, tiny));
@@ -239,8 +216,9 @@ struct SideFoot {
 
 /// The last Newton step from the angle `(c, s)`.
 #[inline(always)]
-fn side_foot<const FMA: bool>(k: &Constants, c: f32, s: f32, x: f32, y: f32, z: f32) -> SideFoot {
-    let f = foot::<FMA>(k, c, s, x, y, z);
+fn side_foot<const FMA: bool>(k: &Constants, c: f32, s: f32, folded: [f32; 3]) -> SideFoot {
+    let f = foot::<FMA>(k, c, s, folded);
+    let [x, y, z] = folded;
     // The last step moves t along with the angle to first order; the remaining error is of second order in the step.
     let step = newton(&f);
     let (c, s) = turned::<FMA>(c, s, step);
@@ -272,7 +250,7 @@ struct Face {
 
 /// The nearest face, given the squared distance `side` to the side.
 #[inline(always)]
-fn nearest_face<const FMA: bool>(k: &Constants, x: f32, y: f32, z: f32, side: f32) -> Face {
+fn nearest_face<const FMA: bool>(k: &Constants, [x, y, z]: [f32; 3], side: f32) -> Face {
     // Inside: between the caps and inside the slice.
     let (xx, yy) = (x * x, y * y);
     let (aa, bb) = k.slice::<FMA>(z);
@@ -291,29 +269,6 @@ fn nearest_face<const FMA: bool>(k: &Constants, x: f32, y: f32, z: f32, side: f3
     Face { inside, proximal: proximal & !distal, distal, decided, squared }
 }
 
-/// The queries in the limb frame, and the angles (cosine, sine) after `STEPS` steps of Newton's iteration.
-#[inline(always)]
-fn angles<const FMA: bool, const N: usize, const STEPS: usize>(
-    k: &Constants,
-    queries: &Block<N>,
-) -> (Block<N>, [f32; N], [f32; N]) {
-    let mut limb = Block::<N>::ZERO;
-    let (mut cosine, mut sine) = ([0f32; N], [0f32; N]);
-    for i in 0..N {
-        let (qx, qy, z) = k.in_limb::<FMA>(queries.x[i], queries.y[i], queries.z[i]);
-        (limb.x[i], limb.y[i], limb.z[i]) = (qx, qy, z);
-        (cosine[i], sine[i]) = first_angle::<FMA>(k, qx.abs(), qy.abs(), z);
-    }
-    for _ in 0..STEPS {
-        for i in 0..N {
-            let (c, s) = (cosine[i], sine[i]);
-            let f = foot::<FMA>(k, c, s, limb.x[i].abs(), limb.y[i].abs(), limb.z[i]);
-            (cosine[i], sine[i]) = turned::<FMA>(c, s, newton(&f));
-        }
-    }
-    (limb, cosine, sine)
-}
-
 /// The kernel over one block. `FMA` states whether fused multiply-add is an instruction of the target.
 ///
 /// It uses three loops instead of one: each is short enough for the processor to overlap its iterations, whose dependency chains
@@ -324,17 +279,33 @@ pub(super) fn closest<const FMA: bool, const N: usize, const STEPS: usize>(
     queries: &Block<N>,
     out: &mut BlockResult<N>,
 ) {
-    let (limb, cosine, sine) = angles::<FMA, N, STEPS>(k, queries);
+    // The queries in the limb frame, and their angles: cosine and sine.
+    let mut limb = [[0.0; N]; 3];
+    let (mut cosine, mut sine) = ([0f32; N], [0f32; N]);
+    let at = |block: &Block<N>, i: usize| [block[0][i], block[1][i], block[2][i]];
+    let folded = |[x, y, z]: [f32; 3]| [x.abs(), y.abs(), z];
     for i in 0..N {
-        let (qx, qy, z) = (limb.x[i], limb.y[i], limb.z[i]);
-        let (x, y) = (qx.abs(), qy.abs());
-        let side = side_foot::<FMA>(k, cosine[i], sine[i], x, y, z);
-        let face = nearest_face::<FMA>(k, x, y, z, side.squared);
+        let query = k.in_limb::<FMA>(at(queries, i));
+        (limb[0][i], limb[1][i], limb[2][i]) = (query[0], query[1], query[2]);
+        (cosine[i], sine[i]) = first_angle::<FMA>(k, folded(query));
+    }
+    for _ in 0..STEPS {
+        for i in 0..N {
+            let (c, s) = (cosine[i], sine[i]);
+            let f = foot::<FMA>(k, c, s, folded(at(&limb, i)));
+            (cosine[i], sine[i]) = turned::<FMA>(c, s, newton(&f));
+        }
+    }
+    for i in 0..N {
+        let query = at(&limb, i);
+        let side = side_foot::<FMA>(k, cosine[i], sine[i], folded(query));
+        let face = nearest_face::<FMA>(k, query, side.squared);
         let cap = face.proximal | face.distal;
         let distance = face.squared.sqrt();
         let sign = select(face.inside, -1.0, 1.0);
 
         // The vector from the query to the surface, limb frame, unfolded.
+        let [qx, qy, z] = query;
         let (sx, sy) = (1f32.copysign(qx), 1f32.copysign(qy));
         let ex = select(cap, 0.0, side.e[0] * sx);
         let ey = select(cap, 0.0, side.e[1] * sy);
@@ -353,21 +324,20 @@ pub(super) fn closest<const FMA: bool, const N: usize, const STEPS: usize>(
         let ny = select(cap, 0.0, ny * inverse);
         let nz = select(face.distal, 1.0, select(face.proximal, -1.0, nz * inverse));
 
-        out.points.x[i] = k.in_world::<FMA>(0, ex, ey, ez, queries.x[i]);
-        out.points.y[i] = k.in_world::<FMA>(1, ex, ey, ez, queries.y[i]);
-        out.points.z[i] = k.in_world::<FMA>(2, ex, ey, ez, queries.z[i]);
-        out.normals.x[i] = k.in_world::<FMA>(0, nx, ny, nz, 0.0);
-        out.normals.y[i] = k.in_world::<FMA>(1, nx, ny, nz, 0.0);
-        out.normals.z[i] = k.in_world::<FMA>(2, nx, ny, nz, 0.0);
-        out.signed_distance[i] = sign * distance;
-        let edge = if side.t <= 0.0 { Region::ProximalRim as u8 } else { Region::DistalRim as u8 };
-        let lateral = if rim { edge } else { Region::Side as u8 };
-        let flat = if face.distal { Region::DistalCap as u8 } else { Region::ProximalCap as u8 };
+        let point = k.in_world::<FMA>([ex, ey, ez], at(queries, i));
+        let normal = k.in_world::<FMA>([nx, ny, nz], [0.0; 3]);
+        for axis in 0..3 {
+            out.points[axis][i] = point[axis];
+            out.normals[axis][i] = normal[axis];
+        }
+        let edge = if side.t <= 0.0 { Region::ProximalRim } else { Region::DistalRim };
+        let lateral = if rim { edge } else { Region::Side };
+        let flat = if face.distal { Region::DistalCap } else { Region::ProximalCap };
         out.region[i] = if cap { flat } else { lateral };
         // Written so that a NaN anywhere counts as unsettled.
-        let clear = (side.trusted | face.decided)
+        let settled = (side.trusted | face.decided)
             & (cap | (norm > 1e-12))
             & (cap | !rim | (distance > RIM_NORMAL_DISTANCE as f32));
-        out.unsettled[i] = u8::from(!clear);
+        out.signed_distance[i] = select(settled, sign * distance, f32::NAN);
     }
 }

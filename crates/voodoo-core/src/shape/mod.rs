@@ -95,15 +95,6 @@ pub enum Region {
     DistalRim = 4,
 }
 
-impl Region {
-    /// The region with this number (`region as u8`), `None` if there is none.
-    pub fn from_u8(number: u8) -> Option<Self> {
-        [Self::Side, Self::ProximalCap, Self::DistalCap, Self::ProximalRim, Self::DistalRim]
-            .get(usize::from(number))
-            .copied()
-    }
-}
-
 /// The point of the surface that is closest to a query, limb frame.
 ///
 /// [`TaperedEllipticCylinder`] has an example.
