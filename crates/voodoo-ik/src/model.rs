@@ -159,31 +159,25 @@ impl ChainModel {
         columns.clear();
         for link in &self.links {
             let world_from_parent = link.parent.map_or(*world_from_base, |parent| poses[parent]);
-            let joint = world_from_parent * link.parent_from_joint;
+            let mut joint = world_from_parent * link.parent_from_joint;
             let value = &angles[link.start..];
-            let pose = match link.turn {
-                Turn::Rigid => joint * link.joint_from_limb,
+            let rotation = match link.turn {
+                Turn::Rigid => Quat::IDENTITY,
                 Turn::Hinge(axis) => {
                     let (sine, cosine) = (0.5 * value[0]).sin_cos();
-                    let rotation = Quat::from_xyzw(axis.x * sine, axis.y * sine, axis.z * sine, cosine);
                     let omega = joint.rotation * axis;
                     columns.push(Column { omega, v: joint.translation.cross(omega) });
-                    Pose::from_parts(joint.translation, joint.rotation * rotation) * link.joint_from_limb
+                    Quat::from_xyzw(axis.x * sine, axis.y * sine, axis.z * sine, cosine)
                 }
-                Turn::Ball => {
-                    let rotation = ball(Vec3::new(value[0], value[1], value[2]), &joint, columns);
-                    Pose::from_parts(joint.translation, joint.rotation * rotation) * link.joint_from_limb
-                }
+                Turn::Ball => ball(Vec3::from_slice(value), &joint, columns),
                 Turn::Free => {
                     let axes = Mat3::from_quat(joint.rotation);
                     columns.extend([axes.x_axis, axes.y_axis, axes.z_axis].map(|v| Column { omega: Vec3::ZERO, v }));
-                    let center = joint.translation + joint.rotation * Vec3::new(value[0], value[1], value[2]);
-                    let joint = Pose::from_parts(center, joint.rotation);
-                    let rotation = ball(Vec3::new(value[3], value[4], value[5]), &joint, columns);
-                    Pose::from_parts(center, joint.rotation * rotation)
+                    joint.translation += joint.rotation * Vec3::from_slice(value);
+                    ball(Vec3::from_slice(&value[3..]), &joint, columns)
                 }
             };
-            poses.push(pose);
+            poses.push(Pose::from_parts(joint.translation, joint.rotation * rotation) * link.joint_from_limb);
         }
     }
 
@@ -198,7 +192,7 @@ impl ChainModel {
             if self.limits[start..start + 3].iter().any(|[low, high]| low.is_finite() || high.is_finite()) {
                 continue;
             }
-            let v = Vec3::new(angles[start], angles[start + 1], angles[start + 2]);
+            let v = Vec3::from_slice(&angles[start..]);
             let angle = v.length();
             if angle > std::f64::consts::PI {
                 let turns = (angle / std::f64::consts::TAU).round();
