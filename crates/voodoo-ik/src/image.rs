@@ -1,7 +1,7 @@
 //! The image criterion (J10 eq. 5-8): how far the projected limbs lie outside the silhouettes.
 
 use super::model::{ChainModel, Kinematics};
-use super::trunk::{Carrier, Trunk};
+use super::trunk::Trunk;
 use super::view::{NEAREST, SilhouetteView};
 use voodoo_core::math::{Mat3, Vec3};
 
@@ -134,7 +134,7 @@ impl Criterion<'_> {
                     let force = scale * (slope - depth / z * nearer);
                     forces[0] += (1.0 - t) * force;
                     forces[1] += t * force;
-                    if let Carrier::Link(link) = trunk.carrier {
+                    if let Some(link) = trunk.link {
                         add_force(model, at, link, x, -fraction * scale * slope, gradient);
                     }
                 }

@@ -20,5 +20,5 @@ pub use image::{Bone, Criterion, SAMPLES};
 pub use model::{ChainModel, Column, Kinematics, Link, Root, Turn};
 pub use project::{project, read};
 pub use solver::{IkProblem, IkSolver, Report, Rest, SolverOptions};
-pub use trunk::{Carrier, Trunk};
+pub use trunk::Trunk;
 pub use view::SilhouetteView;

@@ -8,8 +8,8 @@ use voodoo_core::kinematics::exp;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::{Body, Camera};
 use voodoo_ik::{
-    Aim, Bone, Carrier, ChainModel, Criterion, Goal, IkProblem, IkSolver, Kinematics, Root, SilhouetteView,
-    SolverOptions, Trunk, bones, level_rows, project, trunk,
+    Aim, Bone, ChainModel, Criterion, Goal, IkProblem, IkSolver, Kinematics, Root, SilhouetteView, SolverOptions,
+    Trunk, bones, level_rows, project, trunk,
 };
 
 fn human() -> Body {
@@ -130,7 +130,7 @@ proptest! {
         prop_assert_eq!(trunk.len(), 2);
         // A limb beside the chain, through the body's middle.
         let beside = Pose::from_parts(Vec3::new(0.1, 0.0, -0.3), Quat::from_axis_angle(Vec3::Y, 0.3));
-        trunk.push(Trunk { carrier: Carrier::World(beside), shape: body.limbs()[0].shape });
+        trunk.push(Trunk { link: None, pose: beside, shape: body.limbs()[0].shape });
         let criterion = Criterion { views: &[&view, &deep], segments: &segments, thin, trunk: &trunk };
         let evaluate = |angles: &[f64]| {
             let (mut at, mut gradient) = (Kinematics::default(), vec![0.0; angles.len()]);

@@ -6,7 +6,7 @@ use pyo3::types::PyTuple;
 use voodoo_core::Body;
 use voodoo_core::math::Vec3;
 use voodoo_ik::{
-    self, Aim, Bone, Carrier, ChainModel, Criterion, Goal, IkProblem, IkSolver, Kinematics, Rest, Root, SilhouetteView,
+    self, Aim, Bone, ChainModel, Criterion, Goal, IkProblem, IkSolver, Kinematics, Rest, Root, SilhouetteView,
     SolverOptions, Trunk,
 };
 
@@ -71,8 +71,8 @@ impl PyChain {
                 let message = format!("others: expected limbs that are not on the chain, found {name:?}");
                 return Err(BodyError::new_err(message));
             }
-            let carrier = Carrier::World(pose("others", Some(world_from_limb))?);
-            found.push(Trunk { carrier, shape: self.body.limbs()[limb].shape });
+            let pose = pose("others", Some(world_from_limb))?;
+            found.push(Trunk { link: None, pose, shape: self.body.limbs()[limb].shape });
         }
         Ok(found)
     }
