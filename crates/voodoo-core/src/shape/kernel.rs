@@ -199,76 +199,6 @@ fn first_angle<const FMA: bool>(k: &Constants, [x, y, z]: [f32; 3]) -> (f32, f32
     unit::<FMA>(max(fma::<FMA>(a, x, -(focus * c) * (c * c)), tiny), max(fma::<FMA>(b, y, (focus * s) * (s * s)), tiny))
 }
 
-/// The closest point of the side, for a query folded to `x, y >= 0`.
-struct SideFoot {
-    c: f32,
-    s: f32,
-    /// The parameter along the ruling, 0..1, and the semi-axes there.
-    t: f32,
-    a: f32,
-    b: f32,
-    /// From the query to the point, and the square of its length.
-    e: [f32; 3],
-    squared: f32,
-    /// The iteration has converged to a distinct minimum.
-    trusted: bool,
-}
-
-/// The last Newton step from the angle `(c, s)`.
-#[inline(always)]
-fn side_foot<const FMA: bool>(k: &Constants, c: f32, s: f32, folded: [f32; 3]) -> SideFoot {
-    let f = foot::<FMA>(k, c, s, folded);
-    let [x, y, z] = folded;
-    // The last step moves t along with the angle to first order; the remaining error is of second order in the step.
-    let step = newton(&f);
-    let (c, s) = turned::<FMA>(c, s, step);
-    let free = fma::<FMA>(f.drift, step, f.free);
-    let t = max(min(free, 1.0), 0.0);
-    let (a, b) = (fma::<FMA>(k.da, t, k.a0), fma::<FMA>(k.db, t, k.b0));
-    let (ex, ey) = (fma::<FMA>(a, c, -x), fma::<FMA>(b, s, -y));
-    let ez = fma::<FMA>(k.length, t, -z);
-    let squared = fma::<FMA>(ex, ex, fma::<FMA>(ey, ey, ez * ez));
-    // A step across a rim changes g'' discontinuously, so its error is of first order.
-    let crossed = ((free < 0.0) != (f.free < 0.0)) | ((free > 1.0) != (f.free > 1.0));
-    let error = k.second_order * select(crossed, step.abs(), step * step);
-    let trusted = (error < FOOT_ERROR) & (f.bend >= CONDITIONED * f.tangent);
-    SideFoot { c, s, t, a, b, e: [ex, ey, ez], squared, trusted }
-}
-
-/// Which face is nearest to a query.
-struct Face {
-    /// The query lies inside the solid.
-    inside: bool,
-    /// The nearest face is this cap; at most one of the two.
-    proximal: bool,
-    distal: bool,
-    /// The query lies beyond a cap and projects into it: the cap is the nearest face regardless of the rounding of the side's
-    /// distance.
-    decided: bool,
-    squared: f32,
-}
-
-/// The nearest face, given the squared distance `side` to the side.
-#[inline(always)]
-fn nearest_face<const FMA: bool>(k: &Constants, [x, y, z]: [f32; 3], side: f32) -> Face {
-    // Inside: between the caps and inside the slice.
-    let (xx, yy) = (x * x, y * y);
-    let (aa, bb) = k.slice::<FMA>(z);
-    let (aa, bb) = (aa * aa, bb * bb);
-    let level = fma::<FMA>(xx, bb, fma::<FMA>(yy, aa, -(aa * bb)));
-    let inside = (z > 0.0) & (z < k.length) & (level < 0.0);
-    // Caps, where the query projects into them.
-    let over = |cap: [f32; 3]| fma::<FMA>(xx, cap[1], yy * cap[0]) < cap[2];
-    let top = z - k.length;
-    let (over_proximal, over_distal) = (over(k.proximal), over(k.distal));
-    let decided = (over_proximal & (z < 0.0)) | (over_distal & (top > 0.0));
-    let proximal = over_proximal & ((z < 0.0) | (z * z < side));
-    let squared = select(proximal, z * z, side);
-    let distal = over_distal & ((top > 0.0) | (top * top < squared));
-    let squared = select(distal, top * top, squared);
-    Face { inside, proximal: proximal & !distal, distal, decided, squared }
-}
-
 /// The kernel over one block. `FMA` states whether fused multiply-add is an instruction of the target.
 ///
 /// It uses three loops instead of one: each is short enough for the processor to overlap its iterations, whose dependency chains
@@ -297,23 +227,54 @@ pub(super) fn closest<const FMA: bool, const N: usize, const STEPS: usize>(
         }
     }
     for i in 0..N {
-        let query = at(&limb, i);
-        let side = side_foot::<FMA>(k, cosine[i], sine[i], folded(query));
-        let face = nearest_face::<FMA>(k, query, side.squared);
-        let cap = face.proximal | face.distal;
-        let distance = face.squared.sqrt();
-        let sign = select(face.inside, -1.0, 1.0);
+        let [qx, qy, z] = at(&limb, i);
+        let (x, y) = (qx.abs(), qy.abs());
+
+        // The closest point of the side: the last Newton step moves t along with the angle to first order.
+        let f = foot::<FMA>(k, cosine[i], sine[i], [x, y, z]);
+        let step = newton(&f);
+        let (c, s) = turned::<FMA>(cosine[i], sine[i], step);
+        let free = fma::<FMA>(f.drift, step, f.free);
+        let t = max(min(free, 1.0), 0.0);
+        let (a, b) = (fma::<FMA>(k.da, t, k.a0), fma::<FMA>(k.db, t, k.b0));
+        let (ex, ey) = (fma::<FMA>(a, c, -x), fma::<FMA>(b, s, -y));
+        let ez = fma::<FMA>(k.length, t, -z);
+        let squared = fma::<FMA>(ex, ex, fma::<FMA>(ey, ey, ez * ez));
+        // The remaining error is of second order in the step. A step across a rim changes g'' discontinuously, so its error is of
+        // first order.
+        let crossed = ((free < 0.0) != (f.free < 0.0)) | ((free > 1.0) != (f.free > 1.0));
+        let error = k.second_order * select(crossed, step.abs(), step * step);
+        let trusted = (error < FOOT_ERROR) & (f.bend >= CONDITIONED * f.tangent);
+
+        // Inside: between the caps and inside the slice.
+        let (xx, yy) = (x * x, y * y);
+        let (aa, bb) = k.slice::<FMA>(z);
+        let (aa, bb) = (aa * aa, bb * bb);
+        let level = fma::<FMA>(xx, bb, fma::<FMA>(yy, aa, -(aa * bb)));
+        let inside = (z > 0.0) & (z < k.length) & (level < 0.0);
+        let sign = select(inside, -1.0, 1.0);
+
+        // A cap is the nearest face where the query projects into it and it is nearer than the side. Beyond a cap it is nearer
+        // regardless of the rounding of the side's distance.
+        let over = |cap: [f32; 3]| fma::<FMA>(xx, cap[1], yy * cap[0]) < cap[2];
+        let top = z - k.length;
+        let (over_proximal, over_distal) = (over(k.proximal), over(k.distal));
+        let beyond = (over_proximal & (z < 0.0)) | (over_distal & (top > 0.0));
+        let proximal = over_proximal & ((z < 0.0) | (z * z < squared));
+        let squared = select(proximal, z * z, squared);
+        let distal = over_distal & ((top > 0.0) | (top * top < squared));
+        let distance = select(distal, top * top, squared).sqrt();
+        let proximal = proximal & !distal;
+        let cap = proximal | distal;
 
         // The vector from the query to the surface, limb frame, unfolded.
-        let [qx, qy, z] = query;
         let (sx, sy) = (1f32.copysign(qx), 1f32.copysign(qy));
-        let ex = select(cap, 0.0, side.e[0] * sx);
-        let ey = select(cap, 0.0, side.e[1] * sy);
-        let ez = select(face.distal, -(z - k.length), select(face.proximal, -z, side.e[2]));
+        let ex = select(cap, 0.0, ex * sx);
+        let ey = select(cap, 0.0, ey * sy);
+        let ez = select(distal, -top, select(proximal, -z, ez));
 
         // Normal: P_θ × P_t on the side, the direction to the query on a rim.
-        let rim = (side.t <= 0.0) | (side.t >= 1.0);
-        let (a, b, c, s) = (side.a, side.b, side.c, side.s);
+        let rim = (t <= 0.0) | (t >= 1.0);
         let nx = select(rim, -ex * sign, b * c * k.length * sx);
         let ny = select(rim, -ey * sign, a * s * k.length * sy);
         let slant = fma::<FMA>(a * k.db, s * s, b * k.da * (c * c));
@@ -322,7 +283,7 @@ pub(super) fn closest<const FMA: bool, const N: usize, const STEPS: usize>(
         let inverse = 1.0 / norm.sqrt();
         let nx = select(cap, 0.0, nx * inverse);
         let ny = select(cap, 0.0, ny * inverse);
-        let nz = select(face.distal, 1.0, select(face.proximal, -1.0, nz * inverse));
+        let nz = select(distal, 1.0, select(proximal, -1.0, nz * inverse));
 
         let point = k.in_world::<FMA>([ex, ey, ez], at(queries, i));
         let normal = k.in_world::<FMA>([nx, ny, nz], [0.0; 3]);
@@ -330,14 +291,13 @@ pub(super) fn closest<const FMA: bool, const N: usize, const STEPS: usize>(
             out.points[axis][i] = point[axis];
             out.normals[axis][i] = normal[axis];
         }
-        let edge = if side.t <= 0.0 { Region::ProximalRim } else { Region::DistalRim };
+        let edge = if t <= 0.0 { Region::ProximalRim } else { Region::DistalRim };
         let lateral = if rim { edge } else { Region::Side };
-        let flat = if face.distal { Region::DistalCap } else { Region::ProximalCap };
+        let flat = if distal { Region::DistalCap } else { Region::ProximalCap };
         out.region[i] = if cap { flat } else { lateral };
         // Written so that a NaN anywhere counts as unsettled.
-        let settled = (side.trusted | face.decided)
-            & (cap | (norm > 1e-12))
-            & (cap | !rim | (distance > RIM_NORMAL_DISTANCE as f32));
+        let settled =
+            (trusted | beyond) & (cap | (norm > 1e-12)) & (cap | !rim | (distance > RIM_NORMAL_DISTANCE as f32));
         out.signed_distance[i] = select(settled, sign * distance, f32::NAN);
     }
 }
