@@ -77,10 +77,18 @@ impl FloorFinder {
         if self.level.len() < 20 {
             return None;
         }
-        let mut draw = Draw(0x9e37_79b9_7f4a_7c15);
+        // Points in a pseudo-random sequence that is the same on every run (Vigna's splitmix64).
+        let mut state = 0x9e37_79b9_7f4a_7c15_u64;
+        let mut draw = || {
+            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let mut value = state;
+            value = (value ^ (value >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            value = (value ^ (value >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            self.level[((value ^ (value >> 31)) % self.level.len() as u64) as usize]
+        };
         let mut best: Option<(f64, Ground)> = None;
         for _ in 0..TRIALS {
-            let [a, b, c] = [(); 3].map(|()| self.level[draw.below(self.level.len())]);
+            let [a, b, c] = [(); 3].map(|()| draw());
             let normal = (b - a).cross(c - a);
             let Some(normal) = normal.try_normalize() else { continue };
             let normal = if normal.dot(up) < 0.0 { -normal } else { normal };
@@ -155,19 +163,6 @@ impl FloorFinder {
         let (along_u, along_v) = ((uh * vv - vh * uv) / determinant, (vh * uu - uh * uv) / determinant);
         let normal = (plane.normal - along_u * first - along_v * second).normalize();
         Ground { normal, offset: normal.dot(mean) }
-    }
-}
-
-/// Pseudo-random numbers in a sequence that is the same on every run (Vigna's splitmix64).
-struct Draw(u64);
-
-impl Draw {
-    fn below(&mut self, count: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut value = self.0;
-        value = (value ^ (value >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        value = (value ^ (value >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((value ^ (value >> 31)) % count as u64) as usize
     }
 }
 
