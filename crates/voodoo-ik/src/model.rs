@@ -4,15 +4,6 @@ use voodoo_core::kinematics::hinge_axis;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::{Body, BodyError, JointKind, Limb};
 
-/// Whether the first limb of the chain is among the unknowns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Root {
-    /// Six unknowns: position and rotation vector of the root limb in the base frame.
-    Free,
-    /// No unknowns: the base frame is the parent of the chain's first limb, or the root limb itself.
-    Fixed,
-}
-
 /// How a link moves relative to its parent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Turn {
@@ -75,7 +66,10 @@ pub struct Kinematics {
 impl ChainModel {
     /// Builds the chain of the chosen limbs of a body (all when `limbs` is empty). The limbs must be connected: each but the
     /// first is the child of another one.
-    pub fn new(body: &Body, limbs: &[usize], root: Root) -> Result<Self, BodyError> {
+    ///
+    /// With `free_root`, position and rotation vector of the first limb in the base frame are six unknowns. Without it, the base
+    /// frame is that of the first limb's parent, or of the limb itself where the body has no parent of it.
+    pub fn new(body: &Body, limbs: &[usize], free_root: bool) -> Result<Self, BodyError> {
         let all: Vec<usize> = (0..body.limbs().len()).collect();
         let mut chosen = if limbs.is_empty() { all } else { limbs.to_vec() };
         chosen.sort_unstable();
@@ -85,12 +79,12 @@ impl ChainModel {
             let Some(description) = body.limbs().get(limb) else {
                 return Err(BodyError::value("limbs", "indices of limbs", limb.to_string()));
             };
-            model.add(limb, description, root)?;
+            model.add(limb, description, free_root)?;
         }
         Ok(model)
     }
 
-    fn add(&mut self, limb: usize, description: &Limb, root: Root) -> Result<(), BodyError> {
+    fn add(&mut self, limb: usize, description: &Limb, free_root: bool) -> Result<(), BodyError> {
         let (start, joint) = (self.names.len(), &description.parent);
         let parent = joint.as_ref().and_then(|(index, _)| self.links.iter().position(|link| link.limb == *index));
         if parent.is_none() && !self.links.is_empty() {
@@ -101,7 +95,7 @@ impl ChainModel {
         let first = self.links.is_empty();
         let (mut parent_from_joint, mut joint_from_limb) = (Pose::IDENTITY, Pose::IDENTITY);
         let turn = match joint {
-            _ if first && root == Root::Free => {
+            _ if first && free_root => {
                 self.names.extend(["x", "y", "z", "rx", "ry", "rz"].map(|axis| format!("root_{axis}")));
                 self.limits.extend([free; 6]);
                 Turn::Free

@@ -12,8 +12,6 @@ use super::linear::{Damped, Taken};
 use super::model::{ChainModel, Kinematics};
 use voodoo_core::math::{Pose, refill, reset};
 
-pub use rest::Rest;
-
 /// Residual that a lower level may leave in a higher one, meters.
 const SETTLED: f64 = 1e-10;
 /// Rotation that perturbs a stationary pose with a residual, radians.
@@ -133,8 +131,9 @@ pub struct IkProblem<'a> {
     pub goals: &'a [Goal],
     /// The images, into whose silhouettes the bones are moved in the null space of the goals.
     pub criterion: Option<&'a Criterion<'a>>,
-    /// Rest values that pull angles below all goals and the images: least squares of the differences.
-    pub rest: &'a [Rest],
+    /// Indices of unknowns and their rest values, which pull them below all goals and the images: least squares of the
+    /// differences. A value outside the limits is clamped to them.
+    pub rest: &'a [(usize, f64)],
     /// Parameters.
     pub options: SolverOptions,
 }

@@ -10,15 +10,6 @@ const LEVEL: f64 = 1e-9;
 /// Fractions of a step that are tried in order.
 const FRACTIONS: [f64; 4] = [1.0, 0.25, 0.0625, 0.015_625];
 
-/// An unknown and its value at rest, pulled at lower priority than all goals and the images.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rest {
-    /// Index of the unknown.
-    pub unknown: usize,
-    /// Its value at rest; a value outside its limits is clamped to them.
-    pub angle: f64,
-}
-
 impl IkSolver {
     /// Takes steps towards the rest posture, each corrected by the goals. A step that makes a goal or the images worse is
     /// rejected. Few solves have a rest posture, so the function is marked cold.
@@ -98,9 +89,9 @@ impl IkSolver {
         self.stages[count * n..].fill(0.0);
         for _ in 0..=n {
             self.linear.part.fill(0.0);
-            for rest in problem.rest.iter().filter(|rest| rest.unknown < n) {
-                let now = angles[rest.unknown] + self.stages[count * n + rest.unknown];
-                self.linear.part[rest.unknown] = rest.angle - now;
+            for &(unknown, angle) in problem.rest.iter().filter(|(unknown, _)| *unknown < n) {
+                let now = angles[unknown] + self.stages[count * n + unknown];
+                self.linear.part[unknown] = angle - now;
             }
             self.linear.taken.project(&mut self.linear.part);
             if !self.add_part(problem, count, angles) {
@@ -112,6 +103,6 @@ impl IkSolver {
 
 /// Sum of the squared differences between the angles and their rest values.
 fn rest_error(problem: &IkProblem, angles: &[f64]) -> f64 {
-    let drawn = problem.rest.iter().filter_map(|rest| angles.get(rest.unknown).map(|angle| angle - rest.angle));
+    let drawn = problem.rest.iter().filter_map(|(unknown, rest)| angles.get(*unknown).map(|angle| angle - rest));
     drawn.map(|off| off * off).sum()
 }
