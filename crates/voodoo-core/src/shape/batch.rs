@@ -46,13 +46,6 @@ impl SurfaceBatch {
         self.region.reserve(len.saturating_sub(self.region.len()));
     }
 
-    fn resize(&mut self, len: usize) {
-        self.points.resize(len);
-        self.normals.resize(len);
-        self.signed_distance.resize(len, 0.0);
-        self.region.resize(len, Region::Side);
-    }
-
     /// Computes the result of one query in double precision.
     fn set_exactly(&mut self, index: usize, query: Vec3, shape: &TaperedEllipticCylinder, world_from_limb: &Pose) {
         let found = shape.closest_point(world_from_limb.inverse_transform_point(query));
@@ -75,7 +68,10 @@ impl TaperedEllipticCylinder {
     /// `out` is resized; nothing is allocated once it is large enough.
     pub fn closest_points(&self, world_from_limb: &Pose, queries: &Points, out: &mut SurfaceBatch) {
         let count = queries.len();
-        out.resize(count);
+        out.points.resize(count);
+        out.normals.resize(count);
+        out.signed_distance.resize(count, 0.0);
+        out.region.resize(count, Region::Side);
         if self.aspect_change() > SETTLED || !self.is_blunt() {
             for i in 0..count {
                 out.set_exactly(i, queries.get(i), self, world_from_limb);

@@ -4,7 +4,7 @@ use nalgebra::Vector6;
 
 use super::{ChainSolver, LENGTH_INFORMATION};
 use crate::body::{Body, Pair};
-use crate::math::{Pose, Vec3, dot, factor, half_substitute, reset, solve_in_place};
+use crate::math::{Pose, Vec3, dot, factor, half_substitute, reset, solve_in_place, vectorized};
 use crate::terms::normal_equations::NormalEquations;
 
 impl ChainSolver {
@@ -47,7 +47,7 @@ impl ChainSolver {
         information.clear();
         for row in 0..count {
             let own = &mut mixed[row * n..(row + 1) * n];
-            half_substitute(h, own, n);
+            vectorized!(half_substitute(h, own, n));
             // A NaN leaves no information.
             information.push((reduced[row * count + row] - dot(own, own)).max(0.0));
         }
@@ -99,9 +99,9 @@ impl ChainSolver {
             return false;
         }
         // With `H = L^T L`, `b^T H^-1 c` is the dot product of the two vectors after half of the substitution.
-        half_substitute(h, step, n);
+        vectorized!(half_substitute(h, step, n));
         for row in 0..count {
-            half_substitute(h, &mut mixed[row * n..(row + 1) * n], n);
+            vectorized!(half_substitute(h, &mut mixed[row * n..(row + 1) * n], n));
             let own = &mixed[row * n..(row + 1) * n];
             for other in 0..=row {
                 let taken = dot(own, &mixed[other * n..(other + 1) * n]);
