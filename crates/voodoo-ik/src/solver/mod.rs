@@ -73,7 +73,7 @@ pub struct IkSolver {
     trial_angles: Vec<f64>,
     levels: Levels,
     linear: LinearSystem,
-    /// The step after each level, and after the image: `stages x freedoms`.
+    /// No step, then the step after each level, and after the image: `(stages + 1) x freedoms`.
     stages: Vec<f64>,
     /// Current fraction of the image step.
     gain: f64,
@@ -261,7 +261,7 @@ impl IkSolver {
         {
             reset(vector, n, 0.0);
         }
-        reset(&mut self.stages, (count + 1) * n, 0.0);
+        reset(&mut self.stages, (count + 2) * n, 0.0);
         self.levels.best.clear();
         self.report = Report { converged: true, ..Report::default() };
         self.gain = problem.options.gain;

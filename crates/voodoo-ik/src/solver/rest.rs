@@ -36,12 +36,12 @@ impl IkSolver {
         self.objections.reserve((n + 1) * n);
         for refused in 0..=n {
             self.rest_part(problem, angles);
-            if largest(&self.stages[count * n..]) < problem.options.still {
+            if largest(&self.stages[(count + 1) * n..]) < problem.options.still {
                 return 0.0;
             }
             for fraction in FRACTIONS {
                 for (i, [low, high]) in limits.iter().enumerate() {
-                    angles[i] = (self.phase_start[i] + fraction * self.stages[count * n + i]).clamp(*low, *high);
+                    angles[i] = (self.phase_start[i] + fraction * self.stages[(count + 1) * n + i]).clamp(*low, *high);
                 }
                 problem.model.normalize(angles);
                 self.evaluate_here(&goals_only, angles);
@@ -86,11 +86,11 @@ impl IkSolver {
         for gradient in self.objections.chunks_exact(n.max(1)) {
             self.linear.taken.take(gradient);
         }
-        self.stages[count * n..].fill(0.0);
+        self.stages[(count + 1) * n..].fill(0.0);
         for _ in 0..=n {
             self.linear.part.fill(0.0);
             for &(unknown, angle) in problem.rest.iter().filter(|(unknown, _)| *unknown < n) {
-                let now = angles[unknown] + self.stages[count * n + unknown];
+                let now = angles[unknown] + self.stages[(count + 1) * n + unknown];
                 self.linear.part[unknown] = angle - now;
             }
             self.linear.taken.project(&mut self.linear.part);

@@ -34,10 +34,10 @@ impl IkSolver {
         let n = angles.len();
         let goals = &problem.goals[self.levels.ranges[level].clone()];
         level_rows(problem.model, goals, &self.here.at, &mut self.linear.jacobian, &mut self.linear.residual);
-        self.inherit(level, n);
+        self.stages.copy_within(level * n..(level + 1) * n, (level + 1) * n);
         let damping = self.levels.trust[level] * self.here.cost[level] + LEAST_DAMPING;
         for attempt in 0..=n {
-            let stage = &self.stages[level * n..(level + 1) * n];
+            let stage = &self.stages[(level + 1) * n..(level + 2) * n];
             let rows = self.linear.jacobian.chunks_exact(n).zip(&self.linear.residual);
             refill(&mut self.linear.target, rows.map(|(row, e)| -e - dot(row, stage)));
             if attempt == 0 {
@@ -57,7 +57,7 @@ impl IkSolver {
     /// gradient is small and unreliable, so `alpha = gain h / (|P grad h|^2 + (caution reach)^2)`.
     fn image_part(&mut self, problem: &IkProblem, count: usize, angles: &[f64]) {
         let n = angles.len();
-        self.inherit(count, n);
+        self.stages.copy_within(count * n..(count + 1) * n, (count + 1) * n);
         let blind = problem.options.caution * problem.criterion.map_or(0.0, |criterion| criterion.reach(&self.here.at));
         for _ in 0..=n {
             self.linear.part.copy_from_slice(&self.here.gradient);
@@ -74,15 +74,6 @@ impl IkSolver {
         }
     }
 
-    /// Copies the stage before as the start of this one.
-    fn inherit(&mut self, stage: usize, n: usize) {
-        if stage == 0 {
-            self.stages[..n].fill(0.0);
-        } else {
-            self.stages.copy_within((stage - 1) * n..stage * n, stage * n);
-        }
-    }
-
     /// Adds the part to a stage as far as the limits allow. Returns true if a limit was reached; that unknown is then fixed.
     pub(super) fn add_part(&mut self, problem: &IkProblem, stage: usize, angles: &[f64]) -> bool {
         let n = angles.len();
@@ -91,7 +82,7 @@ impl IkSolver {
             return false;
         }
         let mut fraction = (problem.options.largest_turn / most.max(problem.options.largest_turn)).min(1.0);
-        let step = &mut self.stages[stage * n..(stage + 1) * n];
+        let step = &mut self.stages[(stage + 1) * n..(stage + 2) * n];
         let mut hit = None;
         for (i, [low, high]) in problem.model.limits().iter().enumerate() {
             let (from, by) = (angles[i] + step[i], self.linear.part[i]);
@@ -149,8 +140,8 @@ impl IkSolver {
         let n = angles.len();
         let limits = problem.model.limits();
         for i in 0..n {
-            let above = if stage == 0 { 0.0 } else { self.stages[(stage - 1) * n + i] };
-            let step = above + fraction * (self.stages[stage * n + i] - above);
+            let above = self.stages[stage * n + i];
+            let step = above + fraction * (self.stages[(stage + 1) * n + i] - above);
             // The clamp only removes rounding errors: stages end at the limits.
             self.trial_angles[i] = (angles[i] + step).clamp(limits[i][0], limits[i][1]);
         }
@@ -160,12 +151,12 @@ impl IkSolver {
     /// levels' parts; their number stands for the image.
     fn first_failure(&self, n: usize, stage: usize, slack: bool) -> Option<usize> {
         let count = self.levels.ranges.len();
-        let length = |from: Option<usize>| -> f64 {
-            let step = &self.stages[stage * n..(stage + 1) * n];
-            (0..n).map(|i| step[i] - from.map_or(0.0, |from| self.stages[from * n + i])).map(|d| d * d).sum()
+        let length = |from: usize| -> f64 {
+            let step = self.stages[(stage + 1) * n..(stage + 2) * n].iter().zip(&self.stages[from * n..]);
+            step.map(|(step, from)| step - from).map(|d| d * d).sum()
         };
         for level in 0..count.min(stage + 1) {
-            let rise = length((level == 0).then_some(0));
+            let rise = length(usize::from(level == 0));
             let limit = match self.levels.best.get(level) {
                 Some(best) if !slack => (best + 0.1 * SETTLED).max(self.levels.before[level]),
                 _ => self.levels.before[level] + rise + 1e-13,
@@ -176,8 +167,7 @@ impl IkSolver {
             }
         }
         if stage == count {
-            let above =
-                if stage == 0 { 0.0 } else { dot(&self.here.gradient, &self.stages[(stage - 1) * n..stage * n]) };
+            let above = dot(&self.here.gradient, &self.stages[stage * n..(stage + 1) * n]);
             if self.trial.h.is_nan() || self.trial.h > self.here.h + above.max(0.0) + 1e-9 {
                 return Some(count);
             }
