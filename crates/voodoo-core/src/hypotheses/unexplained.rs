@@ -25,9 +25,8 @@ impl Unexplained {
     pub(super) fn collect(&mut self, context: Context, matched: Matched) {
         let candidates = context.observation.candidates;
         let Self { points, clutter, nearest } = self;
-        points.clear();
         // Reserved now, so that later steps do not allocate.
-        points.reserve(candidates.len());
+        points.make_room(candidates.len());
         reset(nearest, candidates.len(), f32::INFINITY);
         for matches in &matched.correspondences.limbs {
             for (candidate, distance) in matches.candidate.iter().zip(&matches.surface.signed_distance) {
