@@ -4,7 +4,7 @@
 use crate::shape_support;
 use shape_support::{Random, brute_force, hostile, limb_like, random_shape, shape};
 use voodoo_core::math::{Points, Pose, Vec3};
-use voodoo_core::{Region, SurfaceBatch, TaperedEllipticCylinder};
+use voodoo_core::{SurfaceBatch, TaperedEllipticCylinder};
 
 const TOLERANCE: f64 = 1e-6;
 
@@ -48,7 +48,7 @@ fn check(shape: &TaperedEllipticCylinder, pose: &Pose, queries: &Points) -> (f64
         if skew.distance(exact.point) < 2e-4 && deeper.distance(exact.point) < 2e-4 {
             worst.1 = worst.1.max(apart);
             assert!(apart < TOLERANCE, "{apart} {}", context());
-            let region = Region::from_u8(out.region[i]).expect("a region");
+            let region = out.region[i];
             if region == exact.region && exact.signed_distance.abs() > 2e-4 {
                 let expected = pose.rotation * exact.normal;
                 assert!(normal.distance(expected) < 5e-3, "{}", context());

@@ -1,7 +1,7 @@
 //! The network's input for a candidate: 96 x 96 pixels around its center, rotated so that up in the world is up in the image.
 
-use crate::components::{Components, PersonCandidate};
-use crate::view::ThinnedImage;
+use crate::components::PersonCandidate;
+use crate::segmentation::Segmentation;
 use voodoo_core::math::Vec3;
 
 /// Pixels along an edge.
@@ -26,15 +26,10 @@ pub struct Crop {
     pub enlarged: f64,
 }
 
-impl Crop {
-    /// The input image of a candidate; `up` in the camera frame. `None` if the candidate has no pixels.
-    pub(crate) fn from_candidate(
-        view: &ThinnedImage,
-        parts: &Components,
-        candidate: &PersonCandidate,
-        up: Vec3,
-        enlarged: f64,
-    ) -> Option<Self> {
+impl Segmentation {
+    /// The network's input for a candidate of the last image, `enlarged` by this factor. `None` if the candidate has no pixels.
+    pub fn crop(&self, candidate: &PersonCandidate, enlarged: f64) -> Option<Crop> {
+        let Self { view, parts, up, .. } = self;
         // Up in the world is up in the image, unless the camera looks along the vertical.
         let roll = if up.x.hypot(up.y) < LEAST_UP { 0.0 } else { (-up.x).atan2(-up.y) };
         let (sin, cos) = roll.sin_cos();
@@ -58,9 +53,11 @@ impl Crop {
             index.map_or([1.0, 0.0], |index| [((view.depth[index] - z0) / range).clamp(-1.0, 1.0), 1.0])
         };
         let pixels = (0..SIZE * SIZE).map(pixel).collect();
-        Some(Self { pixels, middle: middle.map(f64::from), roll, enlarged })
+        Some(Crop { pixels, middle: middle.map(f64::from), roll, enlarged })
     }
+}
 
+impl Crop {
     /// Converts a position relative to the center (meters right, down and behind, enlarged) to a point in the camera frame.
     pub fn to_camera(&self, place: Vec3) -> Vec3 {
         let place = place / self.enlarged;
@@ -81,7 +78,6 @@ fn median(values: &mut [f32]) -> Option<f32> {
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
-    use crate::segmentation::Segmentation;
     use crate::testing::{before_wall, image, standing};
     use voodoo_core::DepthImage;
     use voodoo_core::Surroundings;

@@ -32,11 +32,6 @@ struct PointLanes {
 }
 
 impl PointLanes {
-    fn clear(&mut self) {
-        self.points.clear();
-        self.near.clear();
-    }
-
     fn push(&mut self, point: Vec3) {
         self.points.push(point.as_vec3().to_array());
         self.near.push((NEAR[0] + NEAR[1] * point.z * point.z) as f32);
@@ -60,7 +55,7 @@ impl PointLanes {
     }
 }
 
-/// Working memory.
+/// Points that were sampled from an image.
 #[derive(Debug, Default)]
 pub(crate) struct FloorFinder {
     points: PointLanes,
@@ -71,16 +66,23 @@ pub(crate) struct FloorFinder {
 
 impl FloorFinder {
     /// Returns the floor in the camera frame; `up` is the approximate upward direction in that frame.
-    pub(crate) fn find(&mut self, view: &ThinnedImage, up: Vec3) -> Option<Ground> {
-        self.sample(view, up);
+    pub(crate) fn find(&self, up: Vec3) -> Option<Ground> {
         let count = self.points.near.len();
         if self.level.len() < 20 {
             return None;
         }
-        let mut draw = Draw(0x9e37_79b9_7f4a_7c15);
+        // Points in a pseudo-random sequence that is the same on every run (Vigna's splitmix64).
+        let mut state = 0x9e37_79b9_7f4a_7c15_u64;
+        let mut draw = || {
+            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let mut value = state;
+            value = (value ^ (value >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            value = (value ^ (value >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            self.level[((value ^ (value >> 31)) % self.level.len() as u64) as usize]
+        };
         let mut best: Option<(f64, Ground)> = None;
         for _ in 0..TRIALS {
-            let [a, b, c] = [(); 3].map(|()| self.level[draw.below(self.level.len())]);
+            let [a, b, c] = [(); 3].map(|()| draw());
             let normal = (b - a).cross(c - a);
             let Some(normal) = normal.try_normalize() else { continue };
             let normal = if normal.dot(up) < 0.0 { -normal } else { normal };
@@ -98,16 +100,15 @@ impl FloorFinder {
         (score > LEAST_FRACTION * count as f64).then(|| NEARER.iter().fold(plane, fitted))
     }
 
-    fn sample(&mut self, view: &ThinnedImage, up: Vec3) {
-        self.points.clear();
-        self.level.clear();
-        self.level_lanes.clear();
+    /// Samples points; `up` is the approximate upward direction.
+    pub(crate) fn new(view: &ThinnedImage, up: Vec3) -> Self {
+        let mut sampled = Self::default();
         let returns = view.depth.iter().filter(|z| **z > 0.0).count();
         let step = (returns / FLOOR_SAMPLES).max(1);
         let beside = ((NEIGHBOR * view.width as f64) as usize).max(2);
         for index in (0..view.depth.len()).filter(|index| view.depth[*index] > 0.0).step_by(step) {
             let point = view.point(index);
-            self.points.push(point);
+            sampled.points.push(point);
             let (column, row) = (index % view.width, index / view.width);
             if column < beside || row < beside {
                 continue;
@@ -116,11 +117,12 @@ impl FloorFinder {
             if view.depth[left] > 0.0 && view.depth[above] > 0.0 {
                 let normal = (view.point(left) - point).cross(view.point(above) - point).normalize_or_zero();
                 if normal.dot(up).abs() > LEAST_UPRIGHT {
-                    self.level.push(point);
-                    self.level_lanes.push(point);
+                    sampled.level.push(point);
+                    sampled.level_lanes.push(point);
                 }
             }
         }
+        sampled
     }
 
     fn score(&self, plane: &Ground) -> f64 {
@@ -155,19 +157,6 @@ impl FloorFinder {
         let (along_u, along_v) = ((uh * vv - vh * uv) / determinant, (vh * uu - uh * uv) / determinant);
         let normal = (plane.normal - along_u * first - along_v * second).normalize();
         Ground { normal, offset: normal.dot(mean) }
-    }
-}
-
-/// Pseudo-random numbers in a sequence that is the same on every run (Vigna's splitmix64).
-struct Draw(u64);
-
-impl Draw {
-    fn below(&mut self, count: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut value = self.0;
-        value = (value ^ (value >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        value = (value ^ (value >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((value ^ (value >> 31)) % count as u64) as usize
     }
 }
 
@@ -211,7 +200,7 @@ mod tests {
             source: 0,
         };
         view.read(&image, &Surroundings::default());
-        FloorFinder::default().find(&view, -Vec3::Y)
+        FloorFinder::new(&view, -Vec3::Y).find(-Vec3::Y)
     }
 
     #[test]

@@ -115,10 +115,8 @@ fn order<'a>(
     query: DetectionQuery,
     camera_from_world: &Pose,
 ) -> Vec<&'a PersonCandidate> {
-    let mut order: Vec<_> = candidates.iter().collect();
-    if query == DetectionQuery::New {
-        order.retain(|candidate| !rejections.is_rejected(candidate));
-    }
+    let is_open = |candidate: &&_| query != DetectionQuery::New || !rejections.is_rejected(candidate);
+    let mut order: Vec<_> = candidates.iter().filter(is_open).collect();
     match query {
         DetectionQuery::All => {}
         DetectionQuery::Any | DetectionQuery::New => {

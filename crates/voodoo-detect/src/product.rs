@@ -6,9 +6,9 @@ use voodoo_core::math::{store, widest};
 
 /// Number of columns that are processed together.
 const TOGETHER: usize = 16;
-/// Number of rows that are processed together. The network's maps have multiples of nine pixels; the sums of nine rows fit into
-/// the registers of AVX-512, those of six rows into the registers of AVX2. The remaining rows are processed in groups of three.
-const ROWS: [usize; 2] = [9, 6];
+/// Number of rows that are processed together: their sums fit into the registers of AVX2. The network's maps have multiples of
+/// nine pixels; the remaining rows are processed in groups of three.
+const ROWS: usize = 6;
 const FEW_ROWS: usize = 3;
 
 /// Trained weights and biases in groups of `TOGETHER` columns; missing columns are zeros.
@@ -42,27 +42,16 @@ impl Panels {
     /// Multiplies each row of `activations` (`inputs` values) with the weights and adds the biases; writes rows of `outputs`
     /// values to `out`.
     pub(crate) fn apply(&self, activations: &[f32], out: &mut [f32]) {
-        let whole = wide_registers();
         widest(
             #[inline(always)]
             || {
                 for group in 0..self.bias.len() {
-                    if whole {
-                        self.columns::<{ ROWS[0] }>(group, activations, out);
-                    } else {
-                        self.columns::<{ ROWS[1] }>(group, activations, out);
-                    }
+                    let (activations, out) = self.rows::<ROWS>(group, activations, out);
+                    let (activations, out) = self.rows::<FEW_ROWS>(group, activations, out);
+                    self.rows::<1>(group, activations, out);
                 }
             },
         );
-    }
-
-    /// Computes the products with the columns of a group, up to `MOST` rows at a time.
-    #[inline(always)]
-    fn columns<const MOST: usize>(&self, group: usize, activations: &[f32], out: &mut [f32]) {
-        let (activations, out) = self.rows::<MOST>(group, activations, out);
-        let (activations, out) = self.rows::<FEW_ROWS>(group, activations, out);
-        self.rows::<1>(group, activations, out);
     }
 
     /// Processes full groups of this number of rows and returns the remaining rows.
@@ -88,14 +77,6 @@ impl Panels {
         }
         (activations_last, out_last)
     }
-}
-
-/// Whether registers are wide enough for the sums of a whole group of columns.
-fn wide_registers() -> bool {
-    #[cfg(target_arch = "x86_64")]
-    return voodoo_core::math::has_avx512();
-    #[cfg(not(target_arch = "x86_64"))]
-    return false;
 }
 
 /// Multiplies this number of rows with the columns of a group.

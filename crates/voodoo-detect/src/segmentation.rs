@@ -1,7 +1,6 @@
 //! Segments a depth image into candidates and crops them for the network.
 
 use crate::components::{Components, PersonCandidate};
-use crate::crop::Crop;
 use crate::floor::FloorFinder;
 use crate::view::ThinnedImage;
 use voodoo_core::math::Vec3;
@@ -10,14 +9,14 @@ use voodoo_core::{DepthImage, Ground, Surroundings};
 /// Segments depth images into candidates; keeps its memory between images.
 #[derive(Debug, Default)]
 pub struct Segmentation {
-    view: ThinnedImage,
-    floor_finder: FloorFinder,
-    parts: Components,
+    pub(crate) view: ThinnedImage,
+    pub(crate) parts: Components,
     /// The candidates of the last image, those of a standing person's size first.
     pub candidates: Vec<PersonCandidate>,
     /// The floor in the last image, given or estimated, camera frame.
     pub floor: Option<Ground>,
-    up: Vec3,
+    /// The upward direction, camera frame.
+    pub(crate) up: Vec3,
 }
 
 impl Segmentation {
@@ -31,17 +30,12 @@ impl Segmentation {
         });
         // If no upward direction is given, up is upwards in the image.
         let up = around.up.map_or(-Vec3::Y, |up| camera_from_world.rotation * up);
-        self.floor = given.or_else(|| self.floor_finder.find(&self.view, up));
+        self.floor = given.or_else(|| FloorFinder::new(&self.view, up).find(up));
         self.up = self.floor.map_or(up, |floor| floor.normal);
         if let Some(floor) = &self.floor {
             self.view.remove_floor(floor);
         }
         self.parts.find(&self.view, &mut self.candidates);
-    }
-
-    /// The network's input for a candidate of the last image, `enlarged` by this factor.
-    pub fn crop(&self, candidate: &PersonCandidate, enlarged: f64) -> Option<Crop> {
-        Crop::from_candidate(&self.view, &self.parts, candidate, self.up, enlarged)
     }
 
     /// Writes the full-image indices of all pixels of a candidate, including those skipped by the subsampling.

@@ -42,32 +42,27 @@ pub(crate) struct Weights {
 impl Weights {
     /// Parses the bytes of a file.
     pub(crate) fn read(bytes: &[u8]) -> Result<Self, WeightsError> {
-        let mut rest = bytes;
-        let first = line(&mut rest)?;
+        let ascii = || WeightsError::new("lines of ASCII and an empty line", "something else");
+        let end = bytes.windows(2).position(|pair| pair == b"\n\n").ok_or_else(ascii)?;
+        let mut lines = std::str::from_utf8(&bytes[..end]).map_err(|_| ascii())?.lines();
+        let first = lines.next().unwrap_or_default();
         if first != FIRST_LINE {
             return Err(WeightsError::new(format!("a first line {FIRST_LINE:?}"), format!("{first:?}")));
         }
-        let mut shapes = Vec::new();
-        loop {
-            let words = line(&mut rest)?;
-            let mut words = words.split(' ');
+        let (mut rest, mut tensors) = (&bytes[end + 2..], BTreeMap::new());
+        for line in lines {
+            let mut words = line.split(' ');
             let name = words.next().unwrap_or_default();
-            if name.is_empty() {
-                break;
-            }
             let wrong = |_| WeightsError::new("a name and whole numbers in each line", format!("the line of {name}"));
             let shape = words.map(str::parse::<usize>).collect::<Result<Vec<_>, _>>().map_err(wrong)?;
-            shapes.push((name.to_owned(), shape));
-        }
-        let mut tensors = BTreeMap::new();
-        for (name, shape) in shapes {
             let count = shape.iter().try_fold(1_usize, |count, edge| count.checked_mul(*edge));
             let bytes = count.and_then(|count| count.checked_mul(2)).and_then(|bytes| rest.split_at_checked(bytes));
             let Some((values, after)) = bytes else {
                 return Err(WeightsError::new(format!("{shape:?} values of {name}"), format!("{} bytes", rest.len())));
             };
             rest = after;
-            tensors.insert(name, (shape, values.as_chunks().0.iter().map(|half| from_half(*half)).collect()));
+            let values = values.as_chunks().0.iter().map(|half| from_half(*half)).collect();
+            tensors.insert(name.to_owned(), (shape, values));
         }
         if !rest.is_empty() {
             return Err(WeightsError::new("the end", format!("{} bytes", rest.len())));
@@ -113,15 +108,6 @@ impl Weights {
         let kernel = if edges == 4 { shape[1] } else { 1 };
         Ok(Layer { weights, bias, kernel })
     }
-}
-
-/// Returns the next line without its newline and removes it from `rest`.
-fn line<'a>(rest: &mut &'a [u8]) -> Result<&'a str, WeightsError> {
-    let wrong = || WeightsError::new("lines of ASCII", "something else");
-    let end = rest.iter().take(200).position(|byte| *byte == b'\n').ok_or_else(wrong)?;
-    let (line, after) = rest.split_at(end);
-    *rest = &after[1..];
-    std::str::from_utf8(line).map_err(|_| wrong())
 }
 
 /// A half float in single precision, exactly.

@@ -2,7 +2,7 @@
 
 use super::image::Bone;
 use super::model::ChainModel;
-use super::trunk::{Carrier, Trunk};
+use super::trunk::Trunk;
 use voodoo_core::Body;
 use voodoo_core::math::{Pose, Vec3};
 
@@ -44,10 +44,10 @@ pub fn bones(body: &Body, model: &ChainModel, margin: f64) -> Vec<Bone> {
 /// The trunk: limbs of the chain, and its base, from which several other limbs branch.
 pub fn trunk(body: &Body, model: &ChainModel, world_from_base: &Pose) -> Vec<Trunk> {
     let base = model.links().first().and_then(|link| body.parent(link.limb));
-    let links = model.links().iter().enumerate().map(|(index, link)| (Carrier::Link(index), link.limb));
-    let limbs = base.map(|limb| (Carrier::World(*world_from_base), limb)).into_iter().chain(links);
-    let trunk = limbs.filter(|(_, limb)| branches(body, *limb));
-    trunk.map(|(carrier, limb)| Trunk { carrier, shape: body.limbs()[limb].shape }).collect()
+    let links = model.links().iter().enumerate().map(|(index, link)| (Some(index), Pose::IDENTITY, link.limb));
+    let limbs = base.map(|limb| (None, *world_from_base, limb)).into_iter().chain(links);
+    let trunk = limbs.filter(|(_, _, limb)| branches(body, *limb));
+    trunk.map(|(link, pose, limb)| Trunk { link, pose, shape: body.limbs()[limb].shape }).collect()
 }
 
 fn branches(body: &Body, limb: usize) -> bool {

@@ -1,7 +1,7 @@
 //! The image criterion (J10 eq. 5-8): how far the projected limbs lie outside the silhouettes.
 
 use super::model::{ChainModel, Kinematics};
-use super::trunk::{Carrier, Trunk};
+use super::trunk::Trunk;
 use super::view::{NEAREST, SilhouetteView};
 use voodoo_core::math::{Mat3, Vec3};
 
@@ -35,6 +35,15 @@ pub struct Criterion<'a> {
     pub thin: f64,
     /// What the bones may not enter: the trunk, and limbs outside the chain.
     pub trunk: &'a [Trunk],
+}
+
+impl Bone {
+    /// Positions of the samples as fractions of its length, and its radius there.
+    fn samples(&self) -> impl Iterator<Item = (f64, f64)> {
+        let [first, last] = self.radius;
+        let places = (0..SAMPLES).map(|sample| (sample as f64 + 0.5) / SAMPLES as f64);
+        places.map(move |t| (t, first + t * (last - first)))
+    }
 }
 
 impl Criterion<'_> {
@@ -73,8 +82,7 @@ impl Criterion<'_> {
                 let (a, b) =
                     (view.camera_from_world.transform_point(ends[0]), view.camera_from_world.transform_point(ends[1]));
                 let mut slopes = [Vec3::ZERO; 2];
-                for t in places() {
-                    let radius = segment.radius[0] + t * (segment.radius[1] - segment.radius[0]);
+                for (t, radius) in segment.samples() {
                     let (value, slope) = view.outside(a + t * (b - a), radius, self.thin);
                     if value > 0.0 {
                         h += value;
@@ -116,8 +124,7 @@ impl Criterion<'_> {
         for trunk in self.trunk {
             let pose = trunk.pose(at);
             let [a, b] = ends.map(|end| pose.inverse_transform_point(end));
-            for t in places().filter(|t| *t >= segment.apart) {
-                let radius = segment.radius[0] + t * (segment.radius[1] - segment.radius[0]);
+            for (t, radius) in segment.samples().filter(|(t, _)| *t >= segment.apart) {
                 let (depth, slope) = trunk.depth(a + t * (b - a), radius);
                 if depth <= 0.0 {
                     continue;
@@ -134,7 +141,7 @@ impl Criterion<'_> {
                     let force = scale * (slope - depth / z * nearer);
                     forces[0] += (1.0 - t) * force;
                     forces[1] += t * force;
-                    if let Carrier::Link(link) = trunk.carrier {
+                    if let Some(link) = trunk.link {
                         add_force(model, at, link, x, -fraction * scale * slope, gradient);
                     }
                 }
@@ -151,9 +158,4 @@ fn add_force(model: &ChainModel, at: &Kinematics, link: usize, x: Vec3, force: V
         let column = &at.columns[mover];
         gradient[mover] += column.omega.dot(moment) + column.v.dot(force);
     }
-}
-
-/// Positions of the samples on a segment, as fractions of its length.
-fn places() -> impl Iterator<Item = f64> {
-    (0..SAMPLES).map(|sample| (sample as f64 + 0.5) / SAMPLES as f64)
 }

@@ -4,15 +4,6 @@ use voodoo_core::kinematics::hinge_axis;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::{Body, BodyError, JointKind, Limb};
 
-/// Whether the first limb of the chain is among the unknowns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Root {
-    /// Six unknowns: position and rotation vector of the root limb in the base frame.
-    Free,
-    /// No unknowns: the base frame is the parent of the chain's first limb, or the root limb itself.
-    Fixed,
-}
-
 /// How a link moves relative to its parent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Turn {
@@ -75,7 +66,10 @@ pub struct Kinematics {
 impl ChainModel {
     /// Builds the chain of the chosen limbs of a body (all when `limbs` is empty). The limbs must be connected: each but the
     /// first is the child of another one.
-    pub fn new(body: &Body, limbs: &[usize], root: Root) -> Result<Self, BodyError> {
+    ///
+    /// With `free_root`, position and rotation vector of the first limb in the base frame are six unknowns. Without it, the base
+    /// frame is that of the first limb's parent, or of the limb itself where the body has no parent of it.
+    pub fn new(body: &Body, limbs: &[usize], free_root: bool) -> Result<Self, BodyError> {
         let all: Vec<usize> = (0..body.limbs().len()).collect();
         let mut chosen = if limbs.is_empty() { all } else { limbs.to_vec() };
         chosen.sort_unstable();
@@ -85,12 +79,12 @@ impl ChainModel {
             let Some(description) = body.limbs().get(limb) else {
                 return Err(BodyError::value("limbs", "indices of limbs", limb.to_string()));
             };
-            model.add(limb, description, root)?;
+            model.add(limb, description, free_root)?;
         }
         Ok(model)
     }
 
-    fn add(&mut self, limb: usize, description: &Limb, root: Root) -> Result<(), BodyError> {
+    fn add(&mut self, limb: usize, description: &Limb, free_root: bool) -> Result<(), BodyError> {
         let (start, joint) = (self.names.len(), &description.parent);
         let parent = joint.as_ref().and_then(|(index, _)| self.links.iter().position(|link| link.limb == *index));
         if parent.is_none() && !self.links.is_empty() {
@@ -101,7 +95,7 @@ impl ChainModel {
         let first = self.links.is_empty();
         let (mut parent_from_joint, mut joint_from_limb) = (Pose::IDENTITY, Pose::IDENTITY);
         let turn = match joint {
-            _ if first && root == Root::Free => {
+            _ if first && free_root => {
                 self.names.extend(["x", "y", "z", "rx", "ry", "rz"].map(|axis| format!("root_{axis}")));
                 self.limits.extend([free; 6]);
                 Turn::Free
@@ -159,31 +153,25 @@ impl ChainModel {
         columns.clear();
         for link in &self.links {
             let world_from_parent = link.parent.map_or(*world_from_base, |parent| poses[parent]);
-            let joint = world_from_parent * link.parent_from_joint;
+            let mut joint = world_from_parent * link.parent_from_joint;
             let value = &angles[link.start..];
-            let pose = match link.turn {
-                Turn::Rigid => joint * link.joint_from_limb,
+            let rotation = match link.turn {
+                Turn::Rigid => Quat::IDENTITY,
                 Turn::Hinge(axis) => {
                     let (sine, cosine) = (0.5 * value[0]).sin_cos();
-                    let rotation = Quat::from_xyzw(axis.x * sine, axis.y * sine, axis.z * sine, cosine);
                     let omega = joint.rotation * axis;
                     columns.push(Column { omega, v: joint.translation.cross(omega) });
-                    Pose::from_parts(joint.translation, joint.rotation * rotation) * link.joint_from_limb
+                    Quat::from_xyzw(axis.x * sine, axis.y * sine, axis.z * sine, cosine)
                 }
-                Turn::Ball => {
-                    let rotation = ball(Vec3::new(value[0], value[1], value[2]), &joint, columns);
-                    Pose::from_parts(joint.translation, joint.rotation * rotation) * link.joint_from_limb
-                }
+                Turn::Ball => ball(Vec3::from_slice(value), &joint, columns),
                 Turn::Free => {
                     let axes = Mat3::from_quat(joint.rotation);
                     columns.extend([axes.x_axis, axes.y_axis, axes.z_axis].map(|v| Column { omega: Vec3::ZERO, v }));
-                    let center = joint.translation + joint.rotation * Vec3::new(value[0], value[1], value[2]);
-                    let joint = Pose::from_parts(center, joint.rotation);
-                    let rotation = ball(Vec3::new(value[3], value[4], value[5]), &joint, columns);
-                    Pose::from_parts(center, joint.rotation * rotation)
+                    joint.translation += joint.rotation * Vec3::from_slice(value);
+                    ball(Vec3::from_slice(&value[3..]), &joint, columns)
                 }
             };
-            poses.push(pose);
+            poses.push(Pose::from_parts(joint.translation, joint.rotation * rotation) * link.joint_from_limb);
         }
     }
 
@@ -198,7 +186,7 @@ impl ChainModel {
             if self.limits[start..start + 3].iter().any(|[low, high]| low.is_finite() || high.is_finite()) {
                 continue;
             }
-            let v = Vec3::new(angles[start], angles[start + 1], angles[start + 2]);
+            let v = Vec3::from_slice(&angles[start..]);
             let angle = v.length();
             if angle > std::f64::consts::PI {
                 let turns = (angle / std::f64::consts::TAU).round();

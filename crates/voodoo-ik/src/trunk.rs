@@ -9,31 +9,21 @@ use voodoo_core::math::{Pose, Vec3};
 /// back.
 const CLEARANCE: f64 = 0.5;
 
-/// What carries a limb that no bone may enter.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Carrier {
-    /// A link of the chain.
-    Link(usize),
-    /// It is not part of the chain and has this pose in the world.
-    World(Pose),
-}
-
 /// A limb that no bone may enter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trunk {
-    /// What carries it.
-    pub carrier: Carrier,
+    /// The link that carries it; `None` for a limb that is not part of the chain.
+    pub link: Option<usize>,
+    /// Its pose in the frame of the link, or else in the world.
+    pub pose: Pose,
     /// Its shape.
     pub shape: TaperedEllipticCylinder,
 }
 
 impl Trunk {
-    /// Its pose.
+    /// Its pose in the world.
     pub(super) fn pose(&self, at: &Kinematics) -> Pose {
-        match self.carrier {
-            Carrier::Link(link) => at.poses[link],
-            Carrier::World(pose) => pose,
-        }
+        self.link.map_or(self.pose, |link| at.poses[link] * self.pose)
     }
 
     /// How deep a point with flesh of a radius around it lies inside, meters (approximate, from the ellipse's level function),

@@ -8,9 +8,7 @@ use counting::allocations_so_far;
 use voodoo_core::HumanModel;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::{Body, Camera};
-use voodoo_ik::{
-    Aim, ChainModel, Criterion, Goal, IkProblem, IkSolver, Rest, Root, SilhouetteView, SolverOptions, bones, trunk,
-};
+use voodoo_ik::{Aim, ChainModel, Criterion, Goal, IkProblem, IkSolver, SilhouetteView, SolverOptions, bones, trunk};
 
 const WARM_UP: usize = 26;
 const COUNTED: usize = 60;
@@ -18,7 +16,7 @@ const COUNTED: usize = 60;
 /// Allocations of a warm solver with two levels, limits, an image and a rest posture, for targets and starts it has not seen.
 fn allocations() -> usize {
     let body = Body::human(1.75, HumanModel::Papers).unwrap();
-    let model = ChainModel::new(&body, &[], Root::Free).unwrap();
+    let model = ChainModel::new(&body, &[], true).unwrap();
     let pixels: Vec<[f32; 2]> = (0..160 * 120)
         .map(|i| ((i % 160) as f32 - 70.0).hypot((i / 160) as f32 - 60.0) - 9.0)
         .map(|distance| [distance, if distance < 0.0 { 9.0 } else { 0.0 }])
@@ -30,7 +28,7 @@ fn allocations() -> usize {
     let segments = bones(&body, &model, 1.0);
     let trunk = trunk(&body, &model, &Pose::IDENTITY);
     let criterion = Criterion { views: &[&view], segments: &segments, thin: 1.7, trunk: &trunk };
-    let rest: Vec<Rest> = (6..model.freedoms()).map(|unknown| Rest { unknown, angle: 0.1 }).collect();
+    let rest: Vec<(usize, f64)> = (6..model.freedoms()).map(|unknown| (unknown, 0.1)).collect();
     let mut solver = IkSolver::default();
     let mut count = 0;
     for index in 0..WARM_UP + COUNTED {

@@ -8,8 +8,8 @@ use voodoo_core::kinematics::exp;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::{Body, Camera};
 use voodoo_ik::{
-    Aim, Bone, Carrier, ChainModel, Criterion, Goal, IkProblem, IkSolver, Kinematics, Root, SilhouetteView,
-    SolverOptions, Trunk, bones, level_rows, project, trunk,
+    Aim, Bone, ChainModel, Criterion, Goal, IkProblem, IkSolver, Kinematics, SilhouetteView, SolverOptions, Trunk,
+    bones, level_rows, project, trunk,
 };
 
 fn human() -> Body {
@@ -19,7 +19,7 @@ fn human() -> Body {
 fn arm() -> (Body, ChainModel) {
     let body = Body::human(1.75, HumanModel::Papers).unwrap();
     let limbs = ["l_upperarm", "l_forearm"].map(|name| body.limb_index(name).unwrap());
-    let model = ChainModel::new(&body, &limbs, Root::Fixed).unwrap();
+    let model = ChainModel::new(&body, &limbs, false).unwrap();
     (body, model)
 }
 
@@ -77,7 +77,7 @@ proptest! {
     #[test]
     fn jacobian_is_the_derivative(angles in values(64, 1.2), site in 0..20_usize, kind in any::<bool>()) {
         let body = human();
-        let model = ChainModel::new(&body, &[], Root::Free).unwrap();
+        let model = ChainModel::new(&body, &[], true).unwrap();
         let angles = &angles[..model.freedoms()];
         let site = &body.sites()[site % body.sites().len()];
         let aim = if kind {
@@ -110,7 +110,7 @@ proptest! {
     #[test]
     fn criterion_gradient_is_the_derivative(angles in values(64, 0.6), radius in 0.0..0.06_f64, thin in 0.0..4.0_f64) {
         let body = human();
-        let model = ChainModel::new(&body, &[], Root::Free).unwrap();
+        let model = ChainModel::new(&body, &[], true).unwrap();
         let mut angles = angles[..model.freedoms()].to_vec();
         angles[2] += 0.2;
         let image = disc(160, 120, [60.0, 50.0], 12.0);
@@ -130,7 +130,7 @@ proptest! {
         prop_assert_eq!(trunk.len(), 2);
         // A limb beside the chain, through the body's middle.
         let beside = Pose::from_parts(Vec3::new(0.1, 0.0, -0.3), Quat::from_axis_angle(Vec3::Y, 0.3));
-        trunk.push(Trunk { carrier: Carrier::World(beside), shape: body.limbs()[0].shape });
+        trunk.push(Trunk { link: None, pose: beside, shape: body.limbs()[0].shape });
         let criterion = Criterion { views: &[&view, &deep], segments: &segments, thin, trunk: &trunk };
         let evaluate = |angles: &[f64]| {
             let (mut at, mut gradient) = (Kinematics::default(), vec![0.0; angles.len()]);
@@ -231,7 +231,7 @@ proptest! {
     #[test]
     fn projection_finds_the_angles_again(angles in values(64, 0.5)) {
         let body = human();
-        let model = ChainModel::new(&body, &[], Root::Free).unwrap();
+        let model = ChainModel::new(&body, &[], true).unwrap();
         let expected: Vec<f64> = angles[..model.freedoms()].iter().zip(model.limits()).map(|(a, [l, h])| a.clamp(*l, *h)).collect();
         let mut at = Kinematics::default();
         model.place(&Pose::IDENTITY, &expected, &mut at);

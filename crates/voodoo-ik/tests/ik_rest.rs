@@ -6,8 +6,8 @@ use voodoo_core::HumanModel;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::{Body, Camera};
 use voodoo_ik::{
-    Aim, ChainModel, Criterion, Goal, IkProblem, IkSolver, Kinematics, Rest, Root, SilhouetteView, SolverOptions,
-    bones, level_cost, level_rows, trunk,
+    Aim, ChainModel, Criterion, Goal, IkProblem, IkSolver, Kinematics, SilhouetteView, SolverOptions, bones,
+    level_cost, level_rows, trunk,
 };
 
 fn long() -> SolverOptions {
@@ -23,7 +23,7 @@ impl Arm {
     fn new(human: HumanModel, limbs: &[&str]) -> Self {
         let body = Body::human(1.75, human).unwrap();
         let limbs: Vec<usize> = limbs.iter().map(|name| body.limb_index(name).unwrap()).collect();
-        let model = ChainModel::new(&body, &limbs, Root::Fixed).unwrap();
+        let model = ChainModel::new(&body, &limbs, false).unwrap();
         Self { body, model }
     }
 
@@ -55,7 +55,7 @@ impl Arm {
         Goal { link, point: site.position, aim, weight: 1.0, level }
     }
 
-    fn solve(&self, goals: &[Goal], criterion: Option<&Criterion>, start: &[f64], rest: Vec<Rest>) -> Vec<f64> {
+    fn solve(&self, goals: &[Goal], criterion: Option<&Criterion>, start: &[f64], rest: Vec<(usize, f64)>) -> Vec<f64> {
         let mut angles = start.to_vec();
         let problem =
             IkProblem { model: &self.model, base: Pose::IDENTITY, goals, criterion, rest: &rest, options: long() };
@@ -73,12 +73,12 @@ impl Arm {
     }
 }
 
-fn rest_at(values: &[f64]) -> Vec<Rest> {
-    values.iter().enumerate().map(|(unknown, angle)| Rest { unknown, angle: *angle }).collect()
+fn rest_at(values: &[f64]) -> Vec<(usize, f64)> {
+    values.iter().copied().enumerate().collect()
 }
 
-fn off(angles: &[f64], rest: &[Rest]) -> f64 {
-    rest.iter().map(|rest| (angles[rest.unknown] - rest.angle).powi(2)).sum()
+fn off(angles: &[f64], rest: &[(usize, f64)]) -> f64 {
+    rest.iter().map(|(unknown, rest)| (angles[*unknown] - rest).powi(2)).sum()
 }
 
 fn values(count: usize, size: f64) -> impl Strategy<Value = Vec<f64>> {
@@ -173,7 +173,7 @@ proptest! {
         let mut rest = rest_at(&rest[..arm.model.freedoms()]);
         rest.truncate(drawn);
         let mut expected = start.clone();
-        rest.iter().for_each(|rest| expected[rest.unknown] = rest.angle);
+        rest.iter().for_each(|(unknown, rest)| expected[*unknown] = *rest);
         let found = arm.solve(&[], None, &start, rest);
         for (found, expected) in found.iter().zip(arm.within(&expected)) {
             prop_assert!((found - expected).abs() < 1e-12);
@@ -209,7 +209,7 @@ fn rest_goes_along_the_border_of_the_silhouette() {
 fn what_is_no_unknown_is_drawn_nowhere() {
     let arm = Arm::stiff();
     let start = arm.within(&[0.1, -0.2, 0.1, 0.4]);
-    let rest = [Rest { unknown: 99, angle: 1.0 }, Rest { unknown: 0, angle: f64::NAN }];
+    let rest = [(99, 1.0), (0, f64::NAN)];
     for rest in rest {
         assert_eq!(arm.solve(&[], None, &start, vec![rest]), start);
     }

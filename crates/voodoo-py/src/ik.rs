@@ -6,8 +6,7 @@ use pyo3::types::PyTuple;
 use voodoo_core::Body;
 use voodoo_core::math::Vec3;
 use voodoo_ik::{
-    self, Aim, Bone, Carrier, ChainModel, Criterion, Goal, IkProblem, IkSolver, Kinematics, Rest, Root, SilhouetteView,
-    SolverOptions, Trunk,
+    self, Aim, Bone, ChainModel, Criterion, Goal, IkProblem, IkSolver, Kinematics, SilhouetteView, SolverOptions, Trunk,
 };
 
 use crate::arrays::{Array, frozen, limb_poses, matrices, pose};
@@ -71,8 +70,8 @@ impl PyChain {
                 let message = format!("others: expected limbs that are not on the chain, found {name:?}");
                 return Err(BodyError::new_err(message));
             }
-            let carrier = Carrier::World(pose("others", Some(world_from_limb))?);
-            found.push(Trunk { carrier, shape: self.body.limbs()[limb].shape });
+            let pose = pose("others", Some(world_from_limb))?;
+            found.push(Trunk { link: None, pose, shape: self.body.limbs()[limb].shape });
         }
         Ok(found)
     }
@@ -103,8 +102,7 @@ impl PyChain {
     #[new]
     fn new(body: &PyBody, limbs: Vec<String>, free_root: bool) -> PyResult<Self> {
         let indices = limbs.iter().map(|name| body.0.limb_index(name)).collect::<Result<Vec<_>, _>>().map_err(raise)?;
-        let root = if free_root { Root::Free } else { Root::Fixed };
-        let model = ChainModel::new(&body.0, &indices, root).map_err(raise)?;
+        let model = ChainModel::new(&body.0, &indices, free_root).map_err(raise)?;
         Ok(Self { body: body.0.clone(), model })
     }
 
@@ -209,7 +207,6 @@ impl PyChain {
         let options = SolverOptions { steps, tolerance, still, gain, caution, largest_turn };
         let mut points = Vec::with_capacity(3 * sites.len() * count);
         let mut numbers = vec![0.0; 5 * count];
-        let rest: Vec<Rest> = rest.into_iter().map(|(unknown, angle)| Rest { unknown, angle }).collect();
         let (mut solver, mut ordered) = (IkSolver::default(), Vec::new());
         py.detach(|| {
             let width = 3 * goals.len();

@@ -36,7 +36,7 @@ impl PyKeypointLayout {
     fn pixels(&self, keypoints: PyReadonlyArray2<'_, f64>, least: f64) -> PyResult<Vec<Option<PixelRow>>> {
         let keypoints = rows("keypoints", &keypoints)?;
         let found = self.0.iter().map(|part| part.pixel(keypoints, least));
-        Ok(found.map(|found| found.map(|found| ((found.pixel[0], found.pixel[1]), found.confidence))).collect())
+        Ok(found.map(|found| found.map(|([u, v], confidence)| ((u, v), confidence))).collect())
     }
 
     /// Index of the person nearest to the predicted positions of the parts.
@@ -79,15 +79,15 @@ impl PyKeypointLayout {
         let (places, mut gate) = (places_of(predicted, self.0.iter().map(|part| &part.site))?, gate);
         let (mut rays, mut points, mut unseen, mut dropped) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for (part, place) in self.0.iter().zip(places) {
-            let Some(found) = part.pixel(keypoints, least) else {
+            let Some((pixel, confidence)) = part.pixel(keypoints, least) else {
                 unseen.push(part.site.clone());
                 continue;
             };
             let Some(expected) = place else { continue };
-            let pixel = (found.pixel[0], found.pixel[1]);
-            let surface: Option<f64> = surface.map_or(Ok(None), |surface| surface.call1((pixel,))?.extract())?;
+            let surface: Option<f64> =
+                surface.map_or(Ok(None), |surface| surface.call1(((pixel[0], pixel[1]),))?.extract())?;
             let hidden = before.map_or(Ok(None), |before| before.call_method1("get", (&part.site,))?.extract())?;
-            let observation = SiteObservation { pixel: found, expected, hidden: hidden.unwrap_or(0.0), surface };
+            let observation = SiteObservation { pixel, confidence, expected, hidden: hidden.unwrap_or(0.0), surface };
             match part.measurement(&observation, &sensor, gate.as_mut().map(|gate| &mut gate.0)) {
                 SiteMeasurement::Ray(direction, sigma) => rays.push(PySiteRay {
                     site: part.site.clone(),

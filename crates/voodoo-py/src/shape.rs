@@ -101,7 +101,7 @@ impl PyShape {
             points: interleave(&batch.points)?,
             normals: interleave(&batch.normals)?,
             signed_distance: PyArray1::from_vec(py, batch.signed_distance).unbind(),
-            region: PyArray1::from_vec(py, batch.region).unbind(),
+            region: PyArray1::from_iter(py, batch.region.iter().map(|region| *region as u8)).unbind(),
         })
     }
 

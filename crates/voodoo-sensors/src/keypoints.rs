@@ -21,15 +21,6 @@ pub struct SiteKeypoints {
     pub behind: f64,
 }
 
-/// A site detected in an image.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SitePixel {
-    /// Column and row.
-    pub pixel: [f64; 2],
-    /// The least confidence of its keypoints, at most 1.
-    pub confidence: f64,
-}
-
 /// The camera of an image, and how its keypoints become measurements.
 #[derive(Clone, Copy, Debug)]
 pub struct Sensor<'a> {
@@ -48,8 +39,10 @@ pub struct Sensor<'a> {
 /// A detected site and its context.
 #[derive(Clone, Copy, Debug)]
 pub struct SiteObservation {
-    /// Its pixel and confidence.
-    pub pixel: SitePixel,
+    /// Its column and row.
+    pub pixel: [f64; 2],
+    /// Its confidence, at most 1.
+    pub confidence: f64,
     /// Predicted position, world frame, meters.
     pub expected: Vec3,
     /// Length of the person's own body in front of the site, meters.
@@ -70,9 +63,9 @@ pub enum SiteMeasurement {
 }
 
 impl SiteKeypoints {
-    /// Pixel of a site from keypoints (column, row, confidence); `None` if one of them is missing or has a confidence below
-    /// `least`.
-    pub fn pixel(&self, keypoints: &[[f64; 3]], least: f64) -> Option<SitePixel> {
+    /// Column and row of a site from keypoints (column, row, confidence), and their least confidence, at most 1; `None` if one of
+    /// them is missing or has a confidence below `least`.
+    pub fn pixel(&self, keypoints: &[[f64; 3]], least: f64) -> Option<([f64; 2], f64)> {
         let (mut pixel, mut total, mut confidence) = ([0.0; 2], 0.0, 1.0_f64);
         for (index, weight) in &self.weights {
             let [u, v, reliability] = *keypoints.get(*index)?;
@@ -82,7 +75,7 @@ impl SiteKeypoints {
         }
         // Missing keypoints are not finite, which makes the sums not finite.
         let known = (pixel[0] + pixel[1] + total).is_finite() && confidence >= least && confidence > 0.0;
-        known.then_some(SitePixel { pixel, confidence })
+        known.then_some((pixel, confidence))
     }
 
     /// Returns a 3-D position where the measured surface passes the gate, else a ray where that passes the gate.
@@ -93,13 +86,13 @@ impl SiteKeypoints {
         mut gate: Option<&mut SiteGate>,
     ) -> SiteMeasurement {
         let (eye, expected) = (&sensor.eye, observation.expected);
-        let direction = eye.direction(observation.pixel.pixel);
+        let direction = eye.direction(observation.pixel);
         let depth = eye.in_sensor(expected).z;
         let away = eye.distance_from_ray(expected, direction);
         if !(depth > 0.0 && away >= 0.0) {
             return SiteMeasurement::Dropped;
         }
-        let across = sensor.noise / observation.pixel.confidence.min(1.0) * depth / eye.focal();
+        let across = sensor.noise / observation.confidence.min(1.0) * depth / eye.focal();
         let sigma = across.hypot(self.spread);
         let mut accepts = |distance: f64, source: &str| {
             gate.as_deref_mut().is_none_or(|gate| gate.accepts(&self.site, distance, sensor.stamp, source))
@@ -129,7 +122,7 @@ pub fn nearest_person<'a>(
 ) -> Option<usize> {
     let middle = |(number, keypoints): (usize, &[[f64; 3]])| {
         let apart = |(part, place): (&SiteKeypoints, &[f64; 2])| {
-            let [u, v] = part.pixel(keypoints, least)?.pixel;
+            let ([u, v], _) = part.pixel(keypoints, least)?;
             Some((u - place[0]).hypot(v - place[1])).filter(|distance| distance.is_finite())
         };
         let mut distances: Vec<f64> = layout.iter().zip(expected).filter_map(apart).collect();
@@ -154,7 +147,7 @@ mod tests {
     fn a_site_is_where_its_keypoints_are_and_unseen_without_one_of_them() {
         let rows = [[100.0, 50.0, 0.9], [120.0, 54.0, 0.4], [0.0, 0.0, 0.0], [1.0, f64::NAN, 0.9]];
         let ears = part(&[(0, 0.5), (1, 0.5)]);
-        assert_eq!(ears.pixel(&rows, 0.1), Some(SitePixel { pixel: [110.0, 52.0], confidence: 0.4 }));
+        assert_eq!(ears.pixel(&rows, 0.1), Some(([110.0, 52.0], 0.4)));
         assert_eq!(ears.pixel(&rows, 0.5), None);
         for missing in [2, 3, 4] {
             assert_eq!(part(&[(0, 0.5), (missing, 0.5)]).pixel(&rows, 0.0), None, "{missing}");
@@ -179,8 +172,8 @@ mod tests {
         let camera = voodoo_core::Camera::pinhole(320, 240, [300.0, 300.0, 160.0, 120.0]).unwrap();
         let eye = Eye { world_from_sensor: voodoo_core::math::Affine3::IDENTITY, camera: &camera };
         let sensor = Sensor { eye, source: "camera", noise: 3.0, place_sigma: 0.03, stamp: 0.0 };
-        let pixel = SitePixel { pixel: [160.0, 120.0], confidence: 1.0 };
-        let observation = SiteObservation { pixel, expected: Vec3::new(0.05, 0.0, 2.0), hidden: 0.0, surface: None };
+        let (pixel, expected) = ([160.0, 120.0], Vec3::new(0.05, 0.0, 2.0));
+        let observation = SiteObservation { pixel, confidence: 1.0, expected, hidden: 0.0, surface: None };
         let wrist = part(&[(0, 1.0)]);
         let mut gate = SiteGate::new(0.1, 0.0, 0.1);
         let sigma = |measured: SiteMeasurement| match measured {
@@ -204,7 +197,7 @@ mod tests {
         let far = SiteObservation { expected: Vec3::new(0.2, 0.0, 2.0), ..observation };
         assert_eq!(wrist.measurement(&far, &sensor, Some(&mut gate)), SiteMeasurement::Dropped);
         for wrong in [
-            SiteObservation { pixel: SitePixel { pixel: [f64::NAN; 2], ..pixel }, ..observation },
+            SiteObservation { pixel: [f64::NAN; 2], ..observation },
             SiteObservation { expected: -Vec3::Z, ..observation },
         ] {
             assert_eq!(wrist.measurement(&wrong, &sensor, None), SiteMeasurement::Dropped);

@@ -127,7 +127,7 @@ pub(crate) fn match_limb(limb: &Limb, pose: &Pose, max_distance: f64, fades: boo
     vectorized!({
         let found = base_weight.iter().zip(&surface.signed_distance).zip(&surface.region);
         for (weight, ((base_weight, distance), region)) in weight.iter_mut().zip(found) {
-            let kept = (distance.abs() <= limit) & (refused >> region & 1 == 0);
+            let kept = (distance.abs() <= limit) & (refused >> *region as u32 & 1 == 0);
             let fade = ((limit - distance.abs()) * per_meter).min(1.0);
             *weight = if kept { *base_weight * fade * fade * (3.0 - 2.0 * fade) } else { 0.0 };
         }

@@ -86,7 +86,7 @@ pub(crate) fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut
         }
     }
     let tip = Vec3::new(0.0, 0.0, shape.length());
-    let sight = camera_from_limb.inverse_transform_vector(-(camera_from_limb * tip)).normalize_or(Vec3::X);
+    let sight = (camera_from_limb.rotation.inverse() * -(camera_from_limb * tip)).normalize_or(Vec3::X);
     let across = sight.with_z(0.0).length();
     if limb.match_caps[1] && across > ASLANT {
         // In an oblique view, the rim of the cap projects beyond its center.

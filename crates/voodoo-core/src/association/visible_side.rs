@@ -63,7 +63,7 @@ fn facing_away(matches: &LimbMatches, range: Range<usize>, [x, y, z]: [f32; 3]) 
     let weight = &weight[range.clone()];
     for i in 0..range.len() {
         let along = nx[i] * (px[i] - x) + ny[i] * (py[i] - y) + nz[i] * (pz[i] - z);
-        away[i] = (along > 0.0) & (distance[i] < 0.0) & (region[i] == Region::Side as u8) & (weight[i] > 0.0);
+        away[i] = (along > 0.0) & (distance[i] < 0.0) & (region[i] == Region::Side) & (weight[i] > 0.0);
     }
     away
 }

@@ -93,7 +93,7 @@ pub fn joint_turn(joint: &Joint, world_from_parent: &Pose, world_from_limb: &Pos
 
 /// Pose of a limb from its parent's pose and the joint's rotation; the joint is closed.
 pub fn place(joint: &Joint, world_from_parent: &Pose, turn: Quat) -> Pose {
-    *world_from_parent * joint.parent_from_joint * Pose::from_rotation(turn) * joint.limb_from_joint.inverse()
+    *world_from_parent * joint.parent_from_joint * Pose::from_parts(Vec3::ZERO, turn) * joint.limb_from_joint.inverse()
 }
 
 /// `exp` of a spatial twist `(omega, v)` (R07 eq. 4, 5) as a pose.

@@ -65,10 +65,8 @@ pub(super) struct RoughSearch {
 impl RoughSearch {
     /// Reserves memory for a frame of `count` candidates.
     pub(super) fn make_room(&mut self, count: usize) {
-        for (points, count) in [(&mut self.unexplained, count), (&mut self.sample, 2 * count)] {
-            points.clear();
-            points.reserve(count);
-        }
+        self.unexplained.make_room(count);
+        self.sample.make_room(2 * count);
         for distances in [&mut self.others, &mut self.nearest, &mut self.distances] {
             make_room(distances, count);
         }

@@ -25,9 +25,8 @@ impl Unexplained {
     /// Collects the unexplained candidates of a frame.
     pub(super) fn collect(&mut self, candidates: &Candidates, correspondences: &Correspondences) {
         let Self { points, clutter, nearest } = self;
-        points.clear();
         // Reserved now, so that later steps do not allocate.
-        points.reserve(candidates.len());
+        points.make_room(candidates.len());
         reset(nearest, candidates.len(), f32::INFINITY);
         for matches in &correspondences.limbs {
             for (candidate, distance) in matches.candidate.iter().zip(&matches.surface.signed_distance) {

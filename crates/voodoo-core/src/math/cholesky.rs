@@ -11,7 +11,7 @@ use super::simd::vectorized;
 pub fn solve_in_place(h: &mut [f64], b: &mut [f64], n: usize) -> bool {
     factor(h, n)
         && vectorized!({
-            half_substitute_lanes(h, b, n);
+            half_substitute(h, b, n);
             for k in 0..n {
                 let (known, rest) = b.split_at_mut(k);
                 let dot: f64 = known.iter().zip(&h[k * n..]).map(|(b, factor)| b * factor).sum();
@@ -50,12 +50,8 @@ pub(crate) fn factor(h: &mut [f64], n: usize) -> bool {
 
 /// The first of the two substitutions, for every right-hand side: `b` becomes `y` with `L^T y = b`, where `l` is the result of
 /// [`factor`]. For two right-hand sides, `y_1^T y_2 = b_1^T h^-1 b_2`.
-pub(crate) fn half_substitute(l: &[f64], b: &mut [f64], n: usize) {
-    vectorized!(half_substitute_lanes(l, b, n));
-}
-
 #[inline(always)]
-fn half_substitute_lanes(l: &[f64], b: &mut [f64], n: usize) {
+pub(crate) fn half_substitute(l: &[f64], b: &mut [f64], n: usize) {
     for k in (0..n).rev() {
         let value = b[k] / l[k * n + k];
         b[k] = value;

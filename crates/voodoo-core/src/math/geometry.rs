@@ -36,12 +36,6 @@ impl Pose {
         Self::from_parts(translation, Quat::IDENTITY)
     }
 
-    /// A rotation alone.
-    #[inline]
-    pub(crate) fn from_rotation(rotation: Quat) -> Self {
-        Self::from_parts(Vec3::ZERO, rotation)
-    }
-
     /// A pose from a translation, meters, and a rotation vector, radians.
     #[inline]
     pub fn new(translation: Vec3, rotation_vector: Vec3) -> Self {
@@ -72,12 +66,6 @@ impl Pose {
     #[inline]
     pub fn inverse_transform_point(&self, point: Vec3) -> Vec3 {
         self.rotation.inverse() * (point - self.translation)
-    }
-
-    /// Rotates a direction by the inverse rotation.
-    #[inline]
-    pub(crate) fn inverse_transform_vector(&self, vector: Vec3) -> Vec3 {
-        self.rotation.inverse() * vector
     }
 
     /// Whether all numbers are finite.

@@ -42,18 +42,16 @@ struct Search {
 impl Search {
     /// Assigns a column to one more row, reassigning other rows as needed.
     fn add(&mut self, row: usize) {
-        let (mut rows, mut columns) = (vec![false; self.row_price.len()], vec![false; self.column_price.len()]);
-        let Some((sink, least)) = self.path(row, &mut rows, &mut columns) else { return };
+        let mut visited = Vec::new();
+        let Some((mut column, least)) = self.path(row, &mut visited) else { return };
         self.row_price[row] += least;
-        for other in (0..rows.len()).filter(|other| rows[*other] && *other != row) {
-            if let Some(column) = self.column_of[other] {
-                self.row_price[other] += least - self.shortest[column];
+        for column in visited {
+            let ahead = least - self.shortest[column];
+            self.column_price[column] -= ahead;
+            if let Some(other) = self.row_of[column] {
+                self.row_price[other] += ahead;
             }
         }
-        for column in (0..columns.len()).filter(|column| columns[*column]) {
-            self.column_price[column] -= least - self.shortest[column];
-        }
-        let mut column = sink;
         loop {
             let other = self.from[column];
             self.row_of[column] = Some(other);
@@ -64,16 +62,15 @@ impl Search {
         }
     }
 
-    /// The shortest augmenting path from a row to an unassigned column, and its length; marks the visited rows and columns.
-    fn path(&mut self, row: usize, rows: &mut [bool], columns: &mut [bool]) -> Option<(usize, f64)> {
-        let mut remaining: Vec<usize> = (0..columns.len()).rev().collect();
+    /// The unassigned column at the end of the shortest augmenting path from a row, and the path's length; adds the visited columns.
+    fn path(&mut self, row: usize, visited: &mut Vec<usize>) -> Option<(usize, f64)> {
+        let mut remaining: Vec<usize> = (0..self.column_price.len()).rev().collect();
         self.shortest.fill(f64::INFINITY);
         let (mut row, mut least) = (row, 0.0);
         loop {
-            rows[row] = true;
             let (mut lowest, mut index) = (f64::INFINITY, None);
             for (place, &column) in remaining.iter().enumerate() {
-                let cost = self.costs[row * columns.len() + column];
+                let cost = self.costs[row * self.column_price.len() + column];
                 let through = least + cost - self.row_price[row] - self.column_price[column];
                 if through < self.shortest[column] {
                     self.from[column] = row;
@@ -87,7 +84,7 @@ impl Search {
             }
             let column = remaining.swap_remove(index.filter(|_| lowest.is_finite())?);
             least = lowest;
-            columns[column] = true;
+            visited.push(column);
             match self.row_of[column] {
                 None => return Some((column, least)),
                 Some(next) => row = next,

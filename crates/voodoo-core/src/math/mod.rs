@@ -14,9 +14,9 @@ pub(crate) use cholesky::{factor, half_substitute};
 pub use geometry::*;
 pub use linear_sum_assignment::linear_sum_assignment;
 pub use rotations::{euler_angles, is_skewed, quaternion};
+pub use simd::{LANES, load, store, widest};
 #[cfg(all(test, target_arch = "x86_64"))]
-pub(crate) use simd::compiled;
-pub use simd::{LANES, has_avx512, load, store, widest};
+pub(crate) use simd::{compiled, has_avx512};
 pub(crate) use simd::{vectorized, widest_fused};
 pub(crate) use weighted_points::WeightedPoints;
 

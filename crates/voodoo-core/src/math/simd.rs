@@ -75,7 +75,7 @@ pub(crate) fn widest_fused<A>(argument: A, plain: impl FnOnce(A), fused: impl Fn
 /// is cached by the standard library.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
-pub fn has_avx512() -> bool {
+pub(crate) fn has_avx512() -> bool {
     std::arch::is_x86_feature_detected!("avx512f")
         && std::arch::is_x86_feature_detected!("avx512bw")
         && std::arch::is_x86_feature_detected!("avx512dq")

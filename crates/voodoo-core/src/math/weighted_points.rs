@@ -23,10 +23,11 @@ impl WeightedPoints {
         self.weights.clear();
     }
 
-    /// Makes room for `len` points in all.
-    pub(crate) fn reserve(&mut self, len: usize) {
+    /// Removes all points and makes room for `len`.
+    pub(crate) fn make_room(&mut self, len: usize) {
+        self.clear();
         self.points.reserve(len);
-        self.weights.reserve(len.saturating_sub(self.weights.len()));
+        self.weights.reserve(len);
     }
 
     /// Appends a point.

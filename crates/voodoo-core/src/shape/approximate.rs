@@ -37,60 +37,39 @@ impl TaperedEllipticCylinder {
     /// [`Self::approximate_distance`] for every query in the frame `world`, in single precision, into `out`.
     pub(crate) fn approximate_distances(&self, world_from_limb: &Pose, queries: &Points, out: &mut Vec<f32>) {
         out.resize(queries.len(), 0.0);
-        let rough = Rough::new(self, world_from_limb);
+        let limb_from_world = world_from_limb.inverse();
+        let rotation = Mat3::from_quat(limb_from_world.rotation);
+        // Rows of the rotation and the translation into the limb frame.
+        let rows = [0, 1, 2].map(|axis| {
+            let row = rotation.row(axis);
+            [row.x, row.y, row.z, limb_from_world.translation[axis]].map(|value| value as f32)
+        });
+        // Semi-axes at the proximal end, and their change per meter.
+        let (length, rate) = (self.length as f32, 1.0 / self.length);
+        let start = [self.a0, self.b0].map(|value| value as f32);
+        let growth = [(self.a1 - self.a0) * rate, (self.b1 - self.b0) * rate].map(|value| value as f32);
+        let max = |a: f32, b: f32| if a > b { a } else { b };
+        let min = |a: f32, b: f32| if a < b { a } else { b };
         vectorized!({
             let places = queries.x.iter().zip(&queries.y).zip(&queries.z);
             for (((x, y), z), out) in places.zip(out.iter_mut()) {
-                *out = rough.distance([*x, *y, *z]);
+                let [x, y, z] = rows.map(|row| row[0] * x + row[1] * y + row[2] * z + row[3]);
+                let within = min(max(z, 0.0), length);
+                let [a, b] = [0, 1].map(|i| max(start[i] + growth[i] * within, 1e-9));
+                let (inv_a, inv_b) = (1.0 / a, 1.0 / b);
+                let (u, v) = (x * inv_a, y * inv_b);
+                let rho_square = u * u + v * v;
+                let above = max(-z, z - length);
+                let climb = u * u * growth[0] * inv_a + v * v * growth[1] * inv_b;
+                let climb = if above > 0.0 { 0.0 } else { climb };
+                let (gx, gy) = (u * inv_a, v * inv_b);
+                let gradient = (gx * gx + gy * gy + climb * climb).sqrt();
+                let side = max((rho_square - rho_square.sqrt()) / max(gradient, 1e-12), -min(a, b));
+                let outside = max(side, 0.0);
+                let beyond = (outside * outside + above * above).sqrt();
+                *out = if above <= 0.0 { max(side, above) } else { beyond };
             }
         });
-    }
-}
-
-/// Shape and pose as needed by the single-precision distance.
-struct Rough {
-    /// Rows of the rotation and the translation from the world to the limb frame.
-    rows: [[f32; 4]; 3],
-    length: f32,
-    /// Semi-axes at the proximal end, and their change per meter.
-    start: [f32; 2],
-    growth: [f32; 2],
-}
-
-impl Rough {
-    fn new(shape: &TaperedEllipticCylinder, world_from_limb: &Pose) -> Self {
-        let limb_from_world = world_from_limb.inverse();
-        let rotation = Mat3::from_quat(limb_from_world.rotation);
-        let shift = limb_from_world.translation;
-        let row = |axis: usize| [rotation.row(axis).x, rotation.row(axis).y, rotation.row(axis).z, shift[axis]];
-        let rate = 1.0 / shape.length;
-        Self {
-            rows: [0, 1, 2].map(|axis| row(axis).map(|value| value as f32)),
-            length: shape.length as f32,
-            start: [shape.a0, shape.b0].map(|value| value as f32),
-            growth: [(shape.a1 - shape.a0) * rate, (shape.b1 - shape.b0) * rate].map(|value| value as f32),
-        }
-    }
-
-    #[inline(always)]
-    fn distance(&self, p: [f32; 3]) -> f32 {
-        let [x, y, z] = self.rows.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3]);
-        let max = |a: f32, b: f32| if a > b { a } else { b };
-        let min = |a: f32, b: f32| if a < b { a } else { b };
-        let within = min(max(z, 0.0), self.length);
-        let [a, b] = [0, 1].map(|i| max(self.start[i] + self.growth[i] * within, 1e-9));
-        let (inv_a, inv_b) = (1.0 / a, 1.0 / b);
-        let (u, v) = (x * inv_a, y * inv_b);
-        let rho_square = u * u + v * v;
-        let above = max(-z, z - self.length);
-        let climb = u * u * self.growth[0] * inv_a + v * v * self.growth[1] * inv_b;
-        let climb = if above > 0.0 { 0.0 } else { climb };
-        let (gx, gy) = (u * inv_a, v * inv_b);
-        let gradient = (gx * gx + gy * gy + climb * climb).sqrt();
-        let side = max((rho_square - rho_square.sqrt()) / max(gradient, 1e-12), -min(a, b));
-        let outside = max(side, 0.0);
-        let beyond = (outside * outside + above * above).sqrt();
-        if above <= 0.0 { max(side, above) } else { beyond }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Closest points of batches of queries.
 
-use super::TaperedEllipticCylinder;
-use super::kernel::{BLOCK, Block, BlockResult, Constants, FEW, MORE, SHORT, closest};
+use super::kernel::{BLOCK, BlockResult, Constants, FEW, MORE, SHORT, closest};
+use super::{Region, TaperedEllipticCylinder};
 use crate::math::{Points, Pose, Vec3, load, store, widest_fused};
 use std::ops::Range;
 
@@ -22,7 +22,7 @@ const SETTLED: f64 = 0.2;
 /// let mut found = SurfaceBatch::default(); // kept and reused: no allocation per call
 /// forearm.closest_points(&Pose::IDENTITY, &queries, &mut found);
 /// assert!((found.signed_distance[0] - 0.1).abs() < 1e-6);
-/// assert_eq!(Region::from_u8(found.region[1]), Some(Region::ProximalCap));
+/// assert_eq!(found.region[1], Region::ProximalCap);
 /// # Ok::<(), voodoo_core::ShapeError>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -33,8 +33,8 @@ pub struct SurfaceBatch {
     pub normals: Points,
     /// Distances, meters, negative inside.
     pub signed_distance: Vec<f32>,
-    /// Faces: [`Region`](super::Region) as a number, decoded by [`Region::from_u8`](super::Region::from_u8).
-    pub region: Vec<u8>,
+    /// Faces.
+    pub region: Vec<Region>,
 }
 
 impl SurfaceBatch {
@@ -46,23 +46,15 @@ impl SurfaceBatch {
         self.region.reserve(len.saturating_sub(self.region.len()));
     }
 
-    fn resize(&mut self, len: usize) {
-        self.points.resize(len);
-        self.normals.resize(len);
-        self.signed_distance.resize(len, 0.0);
-        self.region.resize(len, 0);
-    }
-
     /// Computes the result of one query in double precision.
-    fn set_exactly(&mut self, index: usize, query: [f32; 3], shape: &TaperedEllipticCylinder, world_from_limb: &Pose) {
-        let query = world_from_limb.inverse_transform_point(Vec3::from_array(query.map(f64::from)));
-        let found = shape.closest_point(query);
+    fn set_exactly(&mut self, index: usize, query: Vec3, shape: &TaperedEllipticCylinder, world_from_limb: &Pose) {
+        let found = shape.closest_point(world_from_limb.inverse_transform_point(query));
         let point = world_from_limb.transform_point(found.point);
         let normal = world_from_limb.rotation * found.normal;
         self.points.set(index, point.as_vec3().to_array());
         self.normals.set(index, normal.as_vec3().to_array());
         self.signed_distance[index] = found.signed_distance as f32;
-        self.region[index] = found.region as u8;
+        self.region[index] = found.region;
     }
 }
 
@@ -76,95 +68,84 @@ impl TaperedEllipticCylinder {
     /// `out` is resized; nothing is allocated once it is large enough.
     pub fn closest_points(&self, world_from_limb: &Pose, queries: &Points, out: &mut SurfaceBatch) {
         let count = queries.len();
-        out.resize(count);
+        out.points.resize(count);
+        out.normals.resize(count);
+        out.signed_distance.resize(count, 0.0);
+        out.region.resize(count, Region::Side);
         if self.aspect_change() > SETTLED || !self.is_blunt() {
             for i in 0..count {
-                out.set_exactly(i, [queries.x[i], queries.y[i], queries.z[i]], self, world_from_limb);
+                out.set_exactly(i, queries.get(i), self, world_from_limb);
             }
             return;
         }
         let constants = Constants::new(self, world_from_limb);
-        // More than half a block takes less time as a whole block than as short ones.
-        let rest = count % BLOCK;
-        let whole = if 2 * rest > BLOCK { count } else { count - rest };
-        let mut batch = Batch { shape: self, world_from_limb, constants, out, unsettled: Few::new() };
-        batch.closest_blocks::<BLOCK>(queries, 0..whole);
-        batch.closest_blocks::<SHORT>(queries, whole..count);
-        batch.refine_unsettled();
+        let batch = Batch { shape: self, world_from_limb, constants, queries, out, unsettled: [0; SHORT], waiting: 0 };
+        widest_fused(
+            batch,
+            #[inline(always)]
+            |batch| batch.run::<FMA>(),
+            #[inline(always)]
+            |batch| batch.run::<true>(),
+        );
     }
 }
 
-/// Queries, with their indices, that wait until there are enough to be processed side by side.
-struct Few {
-    queries: Block<SHORT>,
-    indices: [usize; SHORT],
-    count: usize,
-}
-
-impl Few {
-    const fn new() -> Self {
-        Self { queries: Block::ZERO, indices: [0; SHORT], count: 0 }
-    }
-
-    /// Adds a query; returns whether there are now enough.
-    fn push(&mut self, index: usize, [x, y, z]: [f32; 3]) -> bool {
-        let at = self.count;
-        (self.queries.x[at], self.queries.y[at], self.queries.z[at], self.indices[at]) = (x, y, z, index);
-        self.count += 1;
-        self.count == SHORT
-    }
-}
+/// Whether the target that the crate is compiled for has fused multiply-add: every aarch64 processor does.
+const FMA: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
 
 /// Queries to one shape in its pose, and the output of the results.
 struct Batch<'a> {
     shape: &'a TaperedEllipticCylinder,
     world_from_limb: &'a Pose,
     constants: Constants,
+    queries: &'a Points,
     out: &'a mut SurfaceBatch,
-    /// Queries not settled by few single-precision steps.
-    unsettled: Few,
+    /// Queries that few single-precision steps did not settle: so many of them wait to be processed side by side.
+    unsettled: [usize; SHORT],
+    waiting: usize,
 }
 
 impl Batch<'_> {
-    /// Closest points of the queries in `range`, block by block. Unsettled queries are processed whenever there are enough of
-    /// them; the last ones wait.
-    fn closest_blocks<const N: usize>(&mut self, queries: &Points, range: Range<usize>) {
-        widest_fused(
-            self,
-            #[inline(always)]
-            |batch| batch.run_blocks::<FMA, N>(queries, range.clone()),
-            #[inline(always)]
-            |batch| batch.run_blocks::<true, N>(queries, range.clone()),
-        );
+    #[inline(always)]
+    fn run<const FMA: bool>(mut self) {
+        let count = self.queries.len();
+        // More than half a block takes less time as a whole block than as short ones.
+        let rest = count % BLOCK;
+        let whole = if 2 * rest > BLOCK { count } else { count - rest };
+        self.run_blocks::<FMA, BLOCK>(0..whole);
+        self.run_blocks::<FMA, SHORT>(whole..count);
+        if self.waiting > 0 {
+            self.refine_unsettled::<FMA>();
+        }
     }
 
+    /// Closest points of the queries in `range`, block by block.
     #[inline(always)]
-    fn run_blocks<const FMA: bool, const N: usize>(&mut self, queries: &Points, range: Range<usize>) {
-        let mut block = Block::ZERO;
-        let mut found = BlockResult::ZERO;
+    fn run_blocks<const FMA: bool, const N: usize>(&mut self, range: Range<usize>) {
+        let (mut block, mut found) = ([[0.0; N]; 3], BlockResult::ZERO);
         for start in range.clone().step_by(N) {
-            let count = N.min(range.end - start);
-            let span = start..start + count;
+            let span = start..range.end.min(start + N);
             // The tail is padded with the block's previous contents, so that every point goes through the same instructions.
-            load(&mut block.x, &queries.x[span.clone()]);
-            load(&mut block.y, &queries.y[span.clone()]);
-            load(&mut block.z, &queries.z[span.clone()]);
+            load(&mut block[0], &self.queries.x[span.clone()]);
+            load(&mut block[1], &self.queries.y[span.clone()]);
+            load(&mut block[2], &self.queries.z[span.clone()]);
             closest::<FMA, N, FEW>(&self.constants, &block, &mut found);
             let out = &mut *self.out;
-            store(&mut out.points.x[span.clone()], &found.points.x);
-            store(&mut out.points.y[span.clone()], &found.points.y);
-            store(&mut out.points.z[span.clone()], &found.points.z);
-            store(&mut out.normals.x[span.clone()], &found.normals.x);
-            store(&mut out.normals.y[span.clone()], &found.normals.y);
-            store(&mut out.normals.z[span.clone()], &found.normals.z);
+            for (points, [x, y, z]) in [(&mut out.points, &found.points), (&mut out.normals, &found.normals)] {
+                store(&mut points.x[span.clone()], x);
+                store(&mut points.y[span.clone()], y);
+                store(&mut points.z[span.clone()], z);
+            }
             store(&mut out.signed_distance[span.clone()], &found.signed_distance);
-            store(&mut out.region[span], &found.region);
-            if found.unsettled.iter().fold(0, |any, flag| any | flag) == 0 {
+            store(&mut out.region[span.clone()], &found.region);
+            if found.signed_distance.iter().fold(0, |any, distance| any | u32::from(distance.is_nan())) == 0 {
                 continue;
             }
-            for i in (0..count).filter(|i| found.unsettled[*i] != 0) {
-                if self.unsettled.push(start + i, [block.x[i], block.y[i], block.z[i]]) {
-                    self.refine_unsettled();
+            for index in span.filter(|index| found.signed_distance[index - start].is_nan()) {
+                self.unsettled[self.waiting] = index;
+                self.waiting += 1;
+                if self.waiting == SHORT {
+                    self.refine_unsettled::<FMA>();
                 }
             }
         }
@@ -172,44 +153,41 @@ impl Batch<'_> {
 
     /// Takes more single-precision steps for the queries that few steps did not settle, and computes those exactly that these do
     /// not settle either.
-    fn refine_unsettled(&mut self) {
-        let mut found = BlockResult::ZERO;
-        if self.unsettled.count > 0 {
-            run::<SHORT, MORE>(&self.constants, &self.unsettled.queries, &mut found);
-        }
-        for i in 0..self.unsettled.count {
-            let (index, query) = (self.unsettled.indices[i], self.unsettled.queries.get(i));
-            if found.unsettled[i] == 0 {
-                self.out.points.set(index, found.points.get(i));
-                self.out.normals.set(index, found.normals.get(i));
-                (self.out.signed_distance[index], self.out.region[index]) = (found.signed_distance[i], found.region[i]);
+    #[inline(always)]
+    fn refine_unsettled<const FMA: bool>(&mut self) {
+        let (Points { x, y, z }, mut found) = (self.queries, BlockResult::ZERO);
+        let block = [x, y, z].map(|axis| self.unsettled.map(|index| axis[index]));
+        closest::<FMA, SHORT, MORE>(&self.constants, &block, &mut found);
+        for (i, &index) in self.unsettled[..self.waiting].iter().enumerate() {
+            if found.signed_distance[i].is_nan() {
+                self.out.set_exactly(index, self.queries.get(index), self.shape, self.world_from_limb);
             } else {
-                self.out.set_exactly(index, query, self.shape, self.world_from_limb);
+                self.out.points.set(index, found.points.map(|axis| axis[i]));
+                self.out.normals.set(index, found.normals.map(|axis| axis[i]));
+                (self.out.signed_distance[index], self.out.region[index]) = (found.signed_distance[i], found.region[i]);
             }
         }
-        self.unsettled.count = 0;
+        self.waiting = 0;
     }
-}
-
-/// Whether the target that the crate is compiled for has fused multiply-add: every aarch64 processor does.
-const FMA: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
-
-/// [`closest`], compiled for the widest registers of this processor.
-fn run<const N: usize, const STEPS: usize>(constants: &Constants, queries: &Block<N>, out: &mut BlockResult<N>) {
-    widest_fused(
-        out,
-        #[inline(always)]
-        |out| closest::<FMA, N, STEPS>(constants, queries, out),
-        #[inline(always)]
-        |out| closest::<true, N, STEPS>(constants, queries, out),
-    );
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::kernel::Block;
     use super::*;
     #[cfg(target_arch = "x86_64")]
     use crate::math::{compiled, has_avx512};
+
+    /// [`closest`], compiled for the widest registers of this processor.
+    fn run(constants: &Constants, queries: &Block<BLOCK>, out: &mut BlockResult<BLOCK>) {
+        widest_fused(
+            out,
+            #[inline(always)]
+            |out| closest::<FMA, BLOCK, FEW>(constants, queries, out),
+            #[inline(always)]
+            |out| closest::<true, BLOCK, FEW>(constants, queries, out),
+        );
+    }
 
     /// Points on a grid around the side, from 2 cm inside to 4 cm outside.
     fn shell(shape: &TaperedEllipticCylinder) -> Vec<Block<BLOCK>> {
@@ -221,11 +199,8 @@ mod tests {
         };
         (0..200)
             .map(|block| {
-                let mut queries = Block::ZERO;
-                for i in 0..BLOCK {
-                    [queries.x[i], queries.y[i], queries.z[i]] = point(block * BLOCK + i).to_array();
-                }
-                queries
+                let points: [[f32; 3]; BLOCK] = std::array::from_fn(|i| point(block * BLOCK + i).to_array());
+                [0, 1, 2].map(|axis| points.map(|point| point[axis]))
             })
             .collect()
     }
@@ -240,8 +215,8 @@ mod tests {
             let mut found = BlockResult::ZERO;
             let mut unsettled = 0;
             for queries in shell(&shape) {
-                run::<BLOCK, FEW>(&constants, &queries, &mut found);
-                unsettled += found.unsettled.iter().filter(|&&flag| flag != 0).count();
+                run(&constants, &queries, &mut found);
+                unsettled += found.signed_distance.iter().filter(|distance| distance.is_nan()).count();
             }
             let fraction = unsettled as f64 / (200 * BLOCK) as f64;
             assert!(
@@ -258,11 +233,11 @@ mod tests {
         let constants = Constants::new(&shape, &Pose::IDENTITY);
         let (mut fast, mut plain) = (BlockResult::ZERO, BlockResult::ZERO);
         for queries in shell(&shape) {
-            run::<BLOCK, FEW>(&constants, &queries, &mut fast);
+            run(&constants, &queries, &mut fast);
             closest::<FMA, BLOCK, FEW>(&constants, &queries, &mut plain);
-            for i in (0..BLOCK).filter(|&i| fast.unsettled[i] | plain.unsettled[i] == 0) {
-                assert!((fast.points.x[i] - plain.points.x[i]).abs() < 1e-6);
-                assert!((fast.points.y[i] - plain.points.y[i]).abs() < 1e-6);
+            for i in (0..BLOCK).filter(|&i| !(fast.signed_distance[i] + plain.signed_distance[i]).is_nan()) {
+                assert!((fast.points[0][i] - plain.points[0][i]).abs() < 1e-6);
+                assert!((fast.points[1][i] - plain.points[1][i]).abs() < 1e-6);
                 assert!((fast.signed_distance[i] - plain.signed_distance[i]).abs() < 5e-7);
             }
         }
@@ -288,18 +263,12 @@ mod tests {
             );
             compiled!("avx2,fma", closest::<true, BLOCK, FEW>(&constants, &queries, &mut wide));
             let bits = |found: &BlockResult<BLOCK>| {
-                [
-                    &found.points.x,
-                    &found.points.y,
-                    &found.points.z,
-                    &found.normals.x,
-                    &found.normals.z,
-                    &found.signed_distance,
-                ]
-                .map(|values| values.map(f32::to_bits))
+                let [x, y, z] = &found.points;
+                [x, y, z, &found.normals[0], &found.normals[2], &found.signed_distance]
+                    .map(|values| values.map(f32::to_bits))
             };
             assert_eq!(bits(&wider), bits(&wide));
-            assert_eq!((wider.unsettled, wider.region), (wide.unsettled, wide.region));
+            assert_eq!(wider.region, wide.region);
         }
         Ok(())
     }

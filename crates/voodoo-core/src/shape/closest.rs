@@ -51,12 +51,6 @@ impl TaperedEllipticCylinder {
         self.nearest_face(q, self.closest_on_side(Vec3::new(q.x.abs(), q.y.abs(), q.z)))
     }
 
-    /// Whether a minimum is so distinct that the side of a shape whose end ellipses differ little has no other basin.
-    fn is_distinct(&self, minimum: &Foot) -> bool {
-        let (a, b) = self.semi_axes(minimum.t * self.length);
-        minimum.bend >= DISTINCT * ((a * minimum.angle.s).powi(2) + (b * minimum.angle.c).powi(2))
-    }
-
     /// The closest point, given the closest point of the side: a cap may be nearer.
     fn nearest_face(&self, q: Vec3, side: Foot) -> SurfacePoint {
         let mut squared = side.squared;
@@ -113,23 +107,20 @@ impl TaperedEllipticCylinder {
     /// The closest point of the side with its rims, for a query with `x, y >= 0`.
     fn closest_on_side(&self, q: Vec3) -> Foot {
         let guessed = self.refine(Angle::ZERO, self.guess(q), Angle::RIGHT, q);
+        let Angle { c, s } = guessed.angle;
+        let (a, b) = self.semi_axes(guessed.t * self.length);
+        let is_distinct = guessed.bend >= DISTINCT * ((a * s).powi(2) + (b * c).powi(2));
         let one_basin = self.aspect_change() <= ONE_BASIN && self.is_blunt();
-        if one_basin && (self.aspect_change() < 1e-12 || self.is_distinct(&guessed)) {
+        if one_basin && (self.aspect_change() < 1e-12 || is_distinct) {
             return guessed;
         }
-        let mut best = self.scan(None, q);
-        if guessed.squared < best.squared {
-            best = guessed;
-        }
+        let mut best = self.scan(None, q).nearer(guessed);
         for (a, b) in [(self.a0, self.b0), (self.a1, self.b1)] {
             let ratio = a.min(b) / a.max(b).max(f64::MIN_POSITIVE);
             if ratio < 0.5 {
                 // Equal steps in the normal's direction instead of θ: dense at the tips of a flat ellipse.
                 let floor = SHARPEST * a.max(b);
-                let foot = self.scan(Some(Angle { c: a.max(floor), s: b.max(floor) }), q);
-                if foot.squared < best.squared {
-                    best = foot;
-                }
+                best = best.nearer(self.scan(Some(Angle { c: a.max(floor), s: b.max(floor) }), q));
             }
         }
         best
@@ -148,15 +139,9 @@ impl TaperedEllipticCylinder {
         let mut best = feet[0];
         for k in 0..=SCAN {
             let (before, after) = (feet[k.saturating_sub(1)], feet[(k + 1).min(SCAN)]);
-            let low = before.squared.min(after.squared) >= feet[k].squared;
-            if feet[k].squared < best.squared {
-                best = feet[k];
-            }
-            if low {
-                let foot = self.refine(before.angle, feet[k].angle, after.angle, q);
-                if foot.squared < best.squared {
-                    best = foot;
-                }
+            best = best.nearer(feet[k]);
+            if before.squared.min(after.squared) >= feet[k].squared {
+                best = best.nearer(self.refine(before.angle, feet[k].angle, after.angle, q));
             }
         }
         best
@@ -203,9 +188,7 @@ impl TaperedEllipticCylinder {
                 last_step = step.abs();
             }
             foot = self.foot(next, q);
-            if foot.squared < best.squared {
-                best = foot;
-            }
+            best = best.nearer(foot);
         }
         // Near the minimum g is flat to rounding; the last iterate has the better angle, so keep it unless it is worse.
         if foot.squared <= best.squared * (1.0 + 1e-12) { foot } else { best }

@@ -17,40 +17,21 @@ const FOOT_ERROR: f32 = 3e-8;
 /// ratio.
 const CONDITIONED: f32 = DISTINCT as f32;
 
-/// One block of points, structure of arrays.
-#[derive(Clone, Copy)]
-pub(super) struct Block<const N: usize> {
-    pub x: [f32; N],
-    pub y: [f32; N],
-    pub z: [f32; N],
-}
-
-impl<const N: usize> Block<N> {
-    pub(super) const ZERO: Self = Self { x: [0.0; N], y: [0.0; N], z: [0.0; N] };
-
-    pub(super) fn get(&self, at: usize) -> [f32; 3] {
-        [self.x[at], self.y[at], self.z[at]]
-    }
-}
+/// One block of points, axis by axis.
+pub(super) type Block<const N: usize> = [[f32; N]; 3];
 
 /// The results of one block, in the frame of the queries.
 pub(super) struct BlockResult<const N: usize> {
     pub points: Block<N>,
     pub normals: Block<N>,
+    /// NaN where the result is not settled.
     pub signed_distance: [f32; N],
-    pub region: [u8; N],
-    /// Not zero where the exact path must compute the result.
-    pub unsettled: [u8; N],
+    pub region: [Region; N],
 }
 
 impl<const N: usize> BlockResult<N> {
-    pub(super) const ZERO: Self = Self {
-        points: Block::ZERO,
-        normals: Block::ZERO,
-        signed_distance: [0.0; N],
-        region: [0; N],
-        unsettled: [0; N],
-    };
+    pub(super) const ZERO: Self =
+        Self { points: [[0.0; N]; 3], normals: [[0.0; N]; 3], signed_distance: [0.0; N], region: [Region::Side; N] };
 }
 
 /// Shape and pose in single precision, as needed by the kernel.
@@ -104,23 +85,19 @@ impl Constants {
 
     /// Transforms a query into the limb frame.
     #[inline(always)]
-    fn in_limb<const FMA: bool>(&self, x: f32, y: f32, z: f32) -> (f32, f32, f32) {
-        let (wx, wy, wz) = (x - self.origin[0], y - self.origin[1], z - self.origin[2]);
-        let turn = |axis: usize| {
+    fn in_limb<const FMA: bool>(&self, query: [f32; 3]) -> [f32; 3] {
+        let [x, y, z] = [0, 1, 2].map(|axis| query[axis] - self.origin[axis]);
+        [0, 1, 2].map(|axis| {
             let [cx, cy, cz] = self.columns[axis];
-            fma::<FMA>(cx, wx, fma::<FMA>(cy, wy, fma::<FMA>(cz, wz, -self.rest[axis])))
-        };
-        (turn(0), turn(1), turn(2))
+            fma::<FMA>(cx, x, fma::<FMA>(cy, y, fma::<FMA>(cz, z, -self.rest[axis])))
+        })
     }
 
-    /// One coordinate of a limb-frame vector in the frame of the queries, added to `base`.
+    /// A limb-frame vector in the frame of the queries, added to `base`.
     #[inline(always)]
-    fn in_world<const FMA: bool>(&self, axis: usize, x: f32, y: f32, z: f32, base: f32) -> f32 {
-        fma::<FMA>(
-            self.columns[0][axis],
-            x,
-            fma::<FMA>(self.columns[1][axis], y, fma::<FMA>(self.columns[2][axis], z, base)),
-        )
+    fn in_world<const FMA: bool>(&self, [x, y, z]: [f32; 3], base: [f32; 3]) -> [f32; 3] {
+        let [cx, cy, cz] = self.columns;
+        [0, 1, 2].map(|axis| fma::<FMA>(cx[axis], x, fma::<FMA>(cy[axis], y, fma::<FMA>(cz[axis], z, base[axis]))))
     }
 
     /// Semi-axes of the slice at height `z`, clamped to the ends.
@@ -163,7 +140,7 @@ struct LaneFoot {
 }
 
 #[inline(always)]
-fn foot<const FMA: bool>(k: &Constants, c: f32, s: f32, x: f32, y: f32, z: f32) -> LaneFoot {
+fn foot<const FMA: bool>(k: &Constants, c: f32, s: f32, [x, y, z]: [f32; 3]) -> LaneFoot {
     let (dx, dy) = (k.da * c, k.db * s);
     let along = fma::<FMA>(dx, dx, fma::<FMA>(dy, dy, k.length * k.length));
     let inverse = 1.0 / along;
@@ -214,104 +191,12 @@ fn turned<const FMA: bool>(c: f32, s: f32, step: f32) -> (f32, f32) {
 
 /// The start angle: the direction `(x/a, y/b)` in the slice, then one step over the evolute of the slice.
 #[inline(always)]
-fn first_angle<const FMA: bool>(k: &Constants, x: f32, y: f32, z: f32) -> (f32, f32) {
+fn first_angle<const FMA: bool>(k: &Constants, [x, y, z]: [f32; 3]) -> (f32, f32) {
     let (a, b) = k.slice::<FMA>(z);
     let tiny = 1e-18;
     let (c, s) = unit::<FMA>(max(x * b, tiny), max(y * a, tiny));
     let focus = fma::<FMA>(a, a, -(b * b));
     unit::<FMA>(max(fma::<FMA>(a, x, -(focus * c) * (c * c)), tiny), max(fma::<FMA>(b, y, (focus * s) * (s * s)), tiny))
-}
-
-/// The closest point of the side, for a query folded to `x, y >= 0`.
-struct SideFoot {
-    c: f32,
-    s: f32,
-    /// The parameter along the ruling, 0..1, and the semi-axes there.
-    t: f32,
-    a: f32,
-    b: f32,
-    /// From the query to the point, and the square of its length.
-    e: [f32; 3],
-    squared: f32,
-    /// The iteration has converged to a distinct minimum.
-    trusted: bool,
-}
-
-/// The last Newton step from the angle `(c, s)`.
-#[inline(always)]
-fn side_foot<const FMA: bool>(k: &Constants, c: f32, s: f32, x: f32, y: f32, z: f32) -> SideFoot {
-    let f = foot::<FMA>(k, c, s, x, y, z);
-    // The last step moves t along with the angle to first order; the remaining error is of second order in the step.
-    let step = newton(&f);
-    let (c, s) = turned::<FMA>(c, s, step);
-    let free = fma::<FMA>(f.drift, step, f.free);
-    let t = max(min(free, 1.0), 0.0);
-    let (a, b) = (fma::<FMA>(k.da, t, k.a0), fma::<FMA>(k.db, t, k.b0));
-    let (ex, ey) = (fma::<FMA>(a, c, -x), fma::<FMA>(b, s, -y));
-    let ez = fma::<FMA>(k.length, t, -z);
-    let squared = fma::<FMA>(ex, ex, fma::<FMA>(ey, ey, ez * ez));
-    // A step across a rim changes g'' discontinuously, so its error is of first order.
-    let crossed = ((free < 0.0) != (f.free < 0.0)) | ((free > 1.0) != (f.free > 1.0));
-    let error = k.second_order * select(crossed, step.abs(), step * step);
-    let trusted = (error < FOOT_ERROR) & (f.bend >= CONDITIONED * f.tangent);
-    SideFoot { c, s, t, a, b, e: [ex, ey, ez], squared, trusted }
-}
-
-/// Which face is nearest to a query.
-struct Face {
-    /// The query lies inside the solid.
-    inside: bool,
-    /// The nearest face is this cap; at most one of the two.
-    proximal: bool,
-    distal: bool,
-    /// The query lies beyond a cap and projects into it: the cap is the nearest face regardless of the rounding of the side's
-    /// distance.
-    decided: bool,
-    squared: f32,
-}
-
-/// The nearest face, given the squared distance `side` to the side.
-#[inline(always)]
-fn nearest_face<const FMA: bool>(k: &Constants, x: f32, y: f32, z: f32, side: f32) -> Face {
-    // Inside: between the caps and inside the slice.
-    let (xx, yy) = (x * x, y * y);
-    let (aa, bb) = k.slice::<FMA>(z);
-    let (aa, bb) = (aa * aa, bb * bb);
-    let level = fma::<FMA>(xx, bb, fma::<FMA>(yy, aa, -(aa * bb)));
-    let inside = (z > 0.0) & (z < k.length) & (level < 0.0);
-    // Caps, where the query projects into them.
-    let over = |cap: [f32; 3]| fma::<FMA>(xx, cap[1], yy * cap[0]) < cap[2];
-    let top = z - k.length;
-    let (over_proximal, over_distal) = (over(k.proximal), over(k.distal));
-    let decided = (over_proximal & (z < 0.0)) | (over_distal & (top > 0.0));
-    let proximal = over_proximal & ((z < 0.0) | (z * z < side));
-    let squared = select(proximal, z * z, side);
-    let distal = over_distal & ((top > 0.0) | (top * top < squared));
-    let squared = select(distal, top * top, squared);
-    Face { inside, proximal: proximal & !distal, distal, decided, squared }
-}
-
-/// The queries in the limb frame, and the angles (cosine, sine) after `STEPS` steps of Newton's iteration.
-#[inline(always)]
-fn angles<const FMA: bool, const N: usize, const STEPS: usize>(
-    k: &Constants,
-    queries: &Block<N>,
-) -> (Block<N>, [f32; N], [f32; N]) {
-    let mut limb = Block::<N>::ZERO;
-    let (mut cosine, mut sine) = ([0f32; N], [0f32; N]);
-    for i in 0..N {
-        let (qx, qy, z) = k.in_limb::<FMA>(queries.x[i], queries.y[i], queries.z[i]);
-        (limb.x[i], limb.y[i], limb.z[i]) = (qx, qy, z);
-        (cosine[i], sine[i]) = first_angle::<FMA>(k, qx.abs(), qy.abs(), z);
-    }
-    for _ in 0..STEPS {
-        for i in 0..N {
-            let (c, s) = (cosine[i], sine[i]);
-            let f = foot::<FMA>(k, c, s, limb.x[i].abs(), limb.y[i].abs(), limb.z[i]);
-            (cosine[i], sine[i]) = turned::<FMA>(c, s, newton(&f));
-        }
-    }
-    (limb, cosine, sine)
 }
 
 /// The kernel over one block. `FMA` states whether fused multiply-add is an instruction of the target.
@@ -324,25 +209,72 @@ pub(super) fn closest<const FMA: bool, const N: usize, const STEPS: usize>(
     queries: &Block<N>,
     out: &mut BlockResult<N>,
 ) {
-    let (limb, cosine, sine) = angles::<FMA, N, STEPS>(k, queries);
+    // The queries in the limb frame, and their angles: cosine and sine.
+    let mut limb = [[0.0; N]; 3];
+    let (mut cosine, mut sine) = ([0f32; N], [0f32; N]);
+    let at = |block: &Block<N>, i: usize| [block[0][i], block[1][i], block[2][i]];
+    let folded = |[x, y, z]: [f32; 3]| [x.abs(), y.abs(), z];
     for i in 0..N {
-        let (qx, qy, z) = (limb.x[i], limb.y[i], limb.z[i]);
+        let query = k.in_limb::<FMA>(at(queries, i));
+        (limb[0][i], limb[1][i], limb[2][i]) = (query[0], query[1], query[2]);
+        (cosine[i], sine[i]) = first_angle::<FMA>(k, folded(query));
+    }
+    for _ in 0..STEPS {
+        for i in 0..N {
+            let (c, s) = (cosine[i], sine[i]);
+            let f = foot::<FMA>(k, c, s, folded(at(&limb, i)));
+            (cosine[i], sine[i]) = turned::<FMA>(c, s, newton(&f));
+        }
+    }
+    for i in 0..N {
+        let [qx, qy, z] = at(&limb, i);
         let (x, y) = (qx.abs(), qy.abs());
-        let side = side_foot::<FMA>(k, cosine[i], sine[i], x, y, z);
-        let face = nearest_face::<FMA>(k, x, y, z, side.squared);
-        let cap = face.proximal | face.distal;
-        let distance = face.squared.sqrt();
-        let sign = select(face.inside, -1.0, 1.0);
+
+        // The closest point of the side: the last Newton step moves t along with the angle to first order.
+        let f = foot::<FMA>(k, cosine[i], sine[i], [x, y, z]);
+        let step = newton(&f);
+        let (c, s) = turned::<FMA>(cosine[i], sine[i], step);
+        let free = fma::<FMA>(f.drift, step, f.free);
+        let t = max(min(free, 1.0), 0.0);
+        let (a, b) = (fma::<FMA>(k.da, t, k.a0), fma::<FMA>(k.db, t, k.b0));
+        let (ex, ey) = (fma::<FMA>(a, c, -x), fma::<FMA>(b, s, -y));
+        let ez = fma::<FMA>(k.length, t, -z);
+        let squared = fma::<FMA>(ex, ex, fma::<FMA>(ey, ey, ez * ez));
+        // The remaining error is of second order in the step. A step across a rim changes g'' discontinuously, so its error is of
+        // first order.
+        let crossed = ((free < 0.0) != (f.free < 0.0)) | ((free > 1.0) != (f.free > 1.0));
+        let error = k.second_order * select(crossed, step.abs(), step * step);
+        let trusted = (error < FOOT_ERROR) & (f.bend >= CONDITIONED * f.tangent);
+
+        // Inside: between the caps and inside the slice.
+        let (xx, yy) = (x * x, y * y);
+        let (aa, bb) = k.slice::<FMA>(z);
+        let (aa, bb) = (aa * aa, bb * bb);
+        let level = fma::<FMA>(xx, bb, fma::<FMA>(yy, aa, -(aa * bb)));
+        let inside = (z > 0.0) & (z < k.length) & (level < 0.0);
+        let sign = select(inside, -1.0, 1.0);
+
+        // A cap is the nearest face where the query projects into it and it is nearer than the side. Beyond a cap it is nearer
+        // regardless of the rounding of the side's distance.
+        let over = |cap: [f32; 3]| fma::<FMA>(xx, cap[1], yy * cap[0]) < cap[2];
+        let top = z - k.length;
+        let (over_proximal, over_distal) = (over(k.proximal), over(k.distal));
+        let beyond = (over_proximal & (z < 0.0)) | (over_distal & (top > 0.0));
+        let proximal = over_proximal & ((z < 0.0) | (z * z < squared));
+        let squared = select(proximal, z * z, squared);
+        let distal = over_distal & ((top > 0.0) | (top * top < squared));
+        let distance = select(distal, top * top, squared).sqrt();
+        let proximal = proximal & !distal;
+        let cap = proximal | distal;
 
         // The vector from the query to the surface, limb frame, unfolded.
         let (sx, sy) = (1f32.copysign(qx), 1f32.copysign(qy));
-        let ex = select(cap, 0.0, side.e[0] * sx);
-        let ey = select(cap, 0.0, side.e[1] * sy);
-        let ez = select(face.distal, -(z - k.length), select(face.proximal, -z, side.e[2]));
+        let ex = select(cap, 0.0, ex * sx);
+        let ey = select(cap, 0.0, ey * sy);
+        let ez = select(distal, -top, select(proximal, -z, ez));
 
         // Normal: P_θ × P_t on the side, the direction to the query on a rim.
-        let rim = (side.t <= 0.0) | (side.t >= 1.0);
-        let (a, b, c, s) = (side.a, side.b, side.c, side.s);
+        let rim = (t <= 0.0) | (t >= 1.0);
         let nx = select(rim, -ex * sign, b * c * k.length * sx);
         let ny = select(rim, -ey * sign, a * s * k.length * sy);
         let slant = fma::<FMA>(a * k.db, s * s, b * k.da * (c * c));
@@ -351,23 +283,21 @@ pub(super) fn closest<const FMA: bool, const N: usize, const STEPS: usize>(
         let inverse = 1.0 / norm.sqrt();
         let nx = select(cap, 0.0, nx * inverse);
         let ny = select(cap, 0.0, ny * inverse);
-        let nz = select(face.distal, 1.0, select(face.proximal, -1.0, nz * inverse));
+        let nz = select(distal, 1.0, select(proximal, -1.0, nz * inverse));
 
-        out.points.x[i] = k.in_world::<FMA>(0, ex, ey, ez, queries.x[i]);
-        out.points.y[i] = k.in_world::<FMA>(1, ex, ey, ez, queries.y[i]);
-        out.points.z[i] = k.in_world::<FMA>(2, ex, ey, ez, queries.z[i]);
-        out.normals.x[i] = k.in_world::<FMA>(0, nx, ny, nz, 0.0);
-        out.normals.y[i] = k.in_world::<FMA>(1, nx, ny, nz, 0.0);
-        out.normals.z[i] = k.in_world::<FMA>(2, nx, ny, nz, 0.0);
-        out.signed_distance[i] = sign * distance;
-        let edge = if side.t <= 0.0 { Region::ProximalRim as u8 } else { Region::DistalRim as u8 };
-        let lateral = if rim { edge } else { Region::Side as u8 };
-        let flat = if face.distal { Region::DistalCap as u8 } else { Region::ProximalCap as u8 };
+        let point = k.in_world::<FMA>([ex, ey, ez], at(queries, i));
+        let normal = k.in_world::<FMA>([nx, ny, nz], [0.0; 3]);
+        for axis in 0..3 {
+            out.points[axis][i] = point[axis];
+            out.normals[axis][i] = normal[axis];
+        }
+        let edge = if t <= 0.0 { Region::ProximalRim } else { Region::DistalRim };
+        let lateral = if rim { edge } else { Region::Side };
+        let flat = if distal { Region::DistalCap } else { Region::ProximalCap };
         out.region[i] = if cap { flat } else { lateral };
         // Written so that a NaN anywhere counts as unsettled.
-        let clear = (side.trusted | face.decided)
-            & (cap | (norm > 1e-12))
-            & (cap | !rim | (distance > RIM_NORMAL_DISTANCE as f32));
-        out.unsettled[i] = u8::from(!clear);
+        let settled =
+            (trusted | beyond) & (cap | (norm > 1e-12)) & (cap | !rim | (distance > RIM_NORMAL_DISTANCE as f32));
+        out.signed_distance[i] = select(settled, sign * distance, f32::NAN);
     }
 }

@@ -63,17 +63,13 @@ pub enum ShapeError {
     },
     /// Both ends have (nearly) no extent along one axis, so the solid would have no interior.
     #[error(
-        "one of {first} and {second} must be at least {MIN_SIZE} m, found {first_value} and {second_value}: the limb would be flat"
+        "one of {axis}0 and {axis}1 must be at least {MIN_SIZE} m, found {} and {}: the limb would be flat", values[0], values[1]
     )]
     Flat {
-        /// The semi-axis of the proximal end.
-        first: &'static str,
-        /// The semi-axis of the distal end.
-        second: &'static str,
-        /// Its value, meters.
-        first_value: f64,
-        /// Its value, meters.
-        second_value: f64,
+        /// The axis, `a` or `b`.
+        axis: char,
+        /// The semi-axes of the proximal and of the distal end, meters.
+        values: [f64; 2],
     },
 }
 
@@ -93,15 +89,6 @@ pub enum Region {
     ProximalRim = 3,
     /// The edge between the side and the distal cap.
     DistalRim = 4,
-}
-
-impl Region {
-    /// The region with this number (`region as u8`), `None` if there is none.
-    pub fn from_u8(number: u8) -> Option<Self> {
-        [Self::Side, Self::ProximalCap, Self::DistalCap, Self::ProximalRim, Self::DistalRim]
-            .get(usize::from(number))
-            .copied()
-    }
 }
 
 /// The point of the surface that is closest to a query, limb frame.
@@ -156,9 +143,9 @@ impl TaperedEllipticCylinder {
                 return Err(ShapeError::OutOfRange { name, min, value });
             }
         }
-        for (first, second, first_value, second_value) in [("a0", "a1", a0, a1), ("b0", "b1", b0, b1)] {
-            if first_value.max(second_value) < MIN_SIZE {
-                return Err(ShapeError::Flat { first, second, first_value, second_value });
+        for (axis, values) in [('a', [a0, a1]), ('b', [b0, b1])] {
+            if values[0].max(values[1]) < MIN_SIZE {
+                return Err(ShapeError::Flat { axis, values });
             }
         }
         Ok(Self { length, a0, b0, a1, b1 })

@@ -55,6 +55,14 @@ pub(super) struct Foot {
     pub bend: f64,
 }
 
+impl Foot {
+    /// The nearer one of two feet.
+    #[inline(always)]
+    pub(super) fn nearer(self, other: Self) -> Self {
+        if other.squared < self.squared { other } else { self }
+    }
+}
+
 impl TaperedEllipticCylinder {
     /// The foot of `q` (folded to `x, y >= 0`) on the ruling `A + t D` at `angle`.
     #[inline(always)]

@@ -54,7 +54,7 @@ impl Section {
     /// The part of it that faces a camera; `None` when the camera looks along the axis.
     #[inline]
     pub(crate) fn facing(self, camera_from_limb: &Pose) -> Option<FacingSection> {
-        let to_camera = camera_from_limb.inverse_transform_vector(-(*camera_from_limb * self.center()));
+        let to_camera = camera_from_limb.rotation.inverse() * -(*camera_from_limb * self.center());
         let across = to_camera.with_z(0.0);
         let ahead = across.try_normalize()?;
         let side = Vec3::new(-ahead.y, ahead.x, 0.0);

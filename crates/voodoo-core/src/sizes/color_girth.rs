@@ -28,7 +28,7 @@ type LimbEdge = (Vec3, Vec3, f64, f64);
 fn edges_of(pairs: &[RegionPair], limb: usize, working_from_limb: Pose) -> impl Iterator<Item = LimbEdge> {
     pairs.iter().filter(move |pair| pair.limb == limb).map(move |pair| {
         let foot = working_from_limb.inverse_transform_point(pair.x);
-        let normal = working_from_limb.inverse_transform_vector(pair.normal);
+        let normal = working_from_limb.rotation.inverse() * pair.normal;
         (foot, normal, pair.distance, kernel(pair.distance) * pair.information / LINES_ALIKE)
     })
 }

@@ -203,7 +203,7 @@ pub(super) fn first_system(
     for index in (0..matches.weight.len()).filter(|index| matches.weight[*index] > 0.0) {
         let distance = f64::from(matches.surface.signed_distance[index]);
         let foot = working_from_limb.inverse_transform_point(matches.surface.points.get(index));
-        let n = working_from_limb.inverse_transform_vector(matches.surface.normals.get(index));
+        let n = working_from_limb.rotation.inverse() * matches.surface.normals.get(index);
         system.add(shape, foot, n, distance, kernel(distance));
     }
     let information = (INDEPENDENT / points as f64).min(1.0) / (POINT_SIGMA * POINT_SIGMA);

@@ -101,7 +101,7 @@ impl ChainSolver {
                 _ => Vec3::new(part(start), part(start + 1), part(start + 2)),
             };
             // The slot stores the joint's new rotation until the forward pass sets the limb pose.
-            poses[limb] = Pose::from_rotation((Quat::from_scaled_axis(more) * turn).normalize());
+            poses[limb] = Pose::from_parts(Vec3::ZERO, (Quat::from_scaled_axis(more) * turn).normalize());
         }
         poses[0] = exp(&Vector6::from_fn(|i, _| part(i))) * poses[0];
         poses[0].rotation = poses[0].rotation.normalize();

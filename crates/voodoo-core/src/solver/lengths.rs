@@ -4,7 +4,7 @@ use nalgebra::Vector6;
 
 use super::ChainSolver;
 use crate::body::{Body, Pair};
-use crate::math::{Pose, Vec3, dot, factor, half_substitute, reset};
+use crate::math::{Pose, Vec3, dot, factor, half_substitute, reset, vectorized};
 
 impl ChainSolver {
     /// The information matrix of the relative changes of length of `pairs`, and the gradient with respect to these, after
@@ -77,9 +77,9 @@ impl ChainSolver {
         let Self { chain, h, step, mixed, reduced, gradient, .. } = self;
         let n = chain.freedoms;
         // With `H = L^T L`, `b^T H^-1 c` is the dot product of the two vectors after half of the substitution.
-        half_substitute(h, step, n);
+        vectorized!(half_substitute(h, step, n));
         for row in 0..count {
-            half_substitute(h, &mut mixed[row * n..(row + 1) * n], n);
+            vectorized!(half_substitute(h, &mut mixed[row * n..(row + 1) * n], n));
             let own = &mixed[row * n..(row + 1) * n];
             for other in 0..=row {
                 let taken = dot(own, &mixed[other * n..(other + 1) * n]);

@@ -285,7 +285,7 @@ proptest! {
                         matches.surface.points.push(f32s(*pose * found.point));
                         matches.surface.normals.push(f32s(pose.rotation * found.normal));
                         matches.surface.signed_distance.push(found.signed_distance as f32);
-                        matches.surface.region.push(found.region as u8);
+                        matches.surface.region.push(found.region);
                     }
                     matches
                 }).collect();

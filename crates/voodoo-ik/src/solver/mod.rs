@@ -1,7 +1,6 @@
 //! The solver (J10 eq. 4): damped pseudo-inverse steps, strictly ordered levels, the image criterion in their null space, and a
 //! rest posture in what remains free.
 
-mod accept;
 mod rest;
 mod step;
 
@@ -12,8 +11,6 @@ use super::image::Criterion;
 use super::linear::{Damped, Taken};
 use super::model::{ChainModel, Kinematics};
 use voodoo_core::math::{Pose, refill, reset};
-
-pub use rest::Rest;
 
 /// Residual that a lower level may leave in a higher one, meters.
 const SETTLED: f64 = 1e-10;
@@ -76,7 +73,7 @@ pub struct IkSolver {
     trial_angles: Vec<f64>,
     levels: Levels,
     linear: LinearSystem,
-    /// The step after each level, and after the image: `stages x freedoms`.
+    /// No step, then the step after each level, and after the image: `(stages + 1) x freedoms`.
     stages: Vec<f64>,
     /// Current fraction of the image step.
     gain: f64,
@@ -122,17 +119,6 @@ struct LinearSystem {
     part: Vec<f64>,
 }
 
-/// What a step may move for.
-#[derive(Clone, Copy, Debug)]
-struct Active {
-    /// Number of levels; without the image there is at least one.
-    levels: usize,
-    /// Whether the image follows them.
-    image: bool,
-    /// Whether levels above may rise by the second-order effect of a step, which the next step corrects.
-    slack: bool,
-}
-
 /// What is to be solved.
 #[derive(Clone, Copy, Debug)]
 pub struct IkProblem<'a> {
@@ -145,10 +131,17 @@ pub struct IkProblem<'a> {
     pub goals: &'a [Goal],
     /// The images, into whose silhouettes the bones are moved in the null space of the goals.
     pub criterion: Option<&'a Criterion<'a>>,
-    /// Rest values that pull angles below all goals and the images: least squares of the differences.
-    pub rest: &'a [Rest],
+    /// Indices of unknowns and their rest values, which pull them below all goals and the images: least squares of the
+    /// differences. A value outside the limits is clamped to them.
+    pub rest: &'a [(usize, f64)],
     /// Parameters.
     pub options: SolverOptions,
+}
+
+impl IkProblem<'_> {
+    fn without_images(&self) -> Self {
+        Self { criterion: None, ..*self }
+    }
 }
 
 impl IkSolver {
@@ -156,22 +149,23 @@ impl IkSolver {
     pub fn solve(&mut self, problem: &IkProblem, angles: &mut [f64]) -> Report {
         let shows = |criterion: &&Criterion| !criterion.views.is_empty() && !criterion.segments.is_empty();
         let problem = IkProblem { criterion: problem.criterion.filter(shows), ..*problem };
-        self.start(&problem, angles);
+        let goals_only = problem.without_images();
+        self.start(&goals_only, angles);
         let count = self.levels.ranges.len();
         // Levels join one after the other, the image last. Thus the result of a level does not depend on those below it.
         for phase in 0..count + usize::from(problem.criterion.is_some()) {
             // The images are evaluated only in their own phase, so that the levels above do not depend on them.
-            let image = phase == count;
-            if image {
-                self.evaluate_here(&problem, image, angles);
+            let problem = if phase == count { &problem } else { &goals_only };
+            if phase == count {
+                self.evaluate_here(problem, angles);
             }
             angles.clone_into(&mut self.phase_start);
-            self.phase(&problem, phase, true, angles);
-            if phase > 0 && !self.correct_upper_levels(&problem, phase.min(count), image, angles) {
+            self.phase(problem, phase, true, angles);
+            if phase > 0 && !self.correct_upper_levels(problem, phase.min(count), angles) {
                 // Finite steps along curved null spaces led to another local minimum: repeat, with no rise allowed at all.
                 angles.copy_from_slice(&self.phase_start);
-                self.evaluate_here(&problem, image, angles);
-                self.phase(&problem, phase, false, angles);
+                self.evaluate_here(problem, angles);
+                self.phase(problem, phase, false, angles);
             }
             if phase < count {
                 self.levels.best.push(self.here.cost[phase].sqrt());
@@ -184,11 +178,11 @@ impl IkSolver {
         self.report
     }
 
-    /// Steps with the first `phase + 1` levels, or with all levels and the image.
+    /// Steps with the first `phase + 1` levels, or with all levels and the image. With `slack`, a step may raise the levels above
+    /// by its second-order effect, which the next step corrects.
     fn phase(&mut self, problem: &IkProblem, phase: usize, slack: bool, angles: &mut [f64]) {
         let (count, options) = (self.levels.ranges.len(), &problem.options);
-        let image = phase == count;
-        let active = if image { count } else { phase + 1 };
+        let (image, active) = (phase == count, count.min(phase + 1));
         let mut nudged = false;
         let mut idle = 0;
         let mut rest = false;
@@ -200,7 +194,7 @@ impl IkSolver {
             }
             self.report.steps += 1;
             let before = self.here.h;
-            let moved = self.step(problem, Active { levels: active, image, slack }, angles);
+            let moved = self.step(problem, phase, slack, angles);
             idle = if image && before - self.here.h < LEAST_FALL * before { idle + 1 } else { 0 };
             if moved >= options.still && idle < STALLED_STEPS {
                 continue;
@@ -212,20 +206,20 @@ impl IkSolver {
             }
             // Either a saddle (a stretched arm whose hand is to come nearer) or the optimum: a perturbation decides which.
             nudged = true;
-            self.nudge(problem, image, angles);
+            self.nudge(problem, angles);
         }
         if nudged && self.worse_than_saved() {
             angles.copy_from_slice(&self.saved_angles);
-            self.evaluate_here(problem, image, angles);
+            self.evaluate_here(problem, angles);
             rest = true;
         }
         self.report.converged &= rest;
     }
 
     /// Steps with the upper levels alone (at most as many as a phase has), to correct errors from the lower levels' finite steps.
-    /// Returns true when the upper levels are as good as before the phase. With `image` the result is compared with the images.
-    fn correct_upper_levels(&mut self, problem: &IkProblem, levels: usize, image: bool, angles: &mut [f64]) -> bool {
-        let mut moved = false;
+    /// Returns true when the upper levels are as good as before the phase. The result is compared with the images.
+    fn correct_upper_levels(&mut self, problem: &IkProblem, levels: usize, angles: &mut [f64]) -> bool {
+        let (goals_only, mut moved) = (problem.without_images(), false);
         for active in (1..=levels).rev() {
             for _ in 0..problem.options.steps {
                 let reached = self.here.cost[..active].iter().all(|cost| *cost < SETTLED * SETTLED);
@@ -233,13 +227,13 @@ impl IkSolver {
                     break;
                 }
                 moved = true;
-                if self.step(problem, Active { levels: active, image: false, slack: true }, angles) < 1e-12 {
+                if self.step(&goals_only, active - 1, true, angles) < 1e-12 {
                     break;
                 }
             }
         }
-        if image && moved {
-            self.evaluate_here(problem, image, angles);
+        if problem.criterion.is_some() && moved {
+            self.evaluate_here(problem, angles);
         }
         self.here.cost.iter().zip(&self.levels.best).all(|(cost, best)| cost.sqrt() <= best + SETTLED)
     }
@@ -267,35 +261,32 @@ impl IkSolver {
         {
             reset(vector, n, 0.0);
         }
-        reset(&mut self.stages, (count + 1) * n, 0.0);
+        reset(&mut self.stages, (count + 2) * n, 0.0);
         self.levels.best.clear();
         self.report = Report { converged: true, ..Report::default() };
         self.gain = problem.options.gain;
-        self.evaluate_here(problem, false, angles);
+        self.evaluate_here(problem, angles);
     }
 
-    fn evaluate_here(&mut self, problem: &IkProblem, image: bool, angles: &[f64]) {
+    fn evaluate_here(&mut self, problem: &IkProblem, angles: &[f64]) {
         self.trial_angles.copy_from_slice(angles);
-        self.evaluate(problem, image);
+        self.evaluate(problem);
         std::mem::swap(&mut self.here, &mut self.trial);
     }
 
-    /// Computes costs and kinematics at the trial angles, and with `image` the criterion.
-    fn evaluate(&mut self, problem: &IkProblem, image: bool) {
+    /// Computes costs, kinematics and the criterion at the trial angles.
+    fn evaluate(&mut self, problem: &IkProblem) {
         self.report.tried += 1;
         problem.model.place(&problem.base, &self.trial_angles, &mut self.trial.at);
         let costs = self.levels.ranges.iter().map(|level| level_cost(&problem.goals[level.clone()], &self.trial.at));
         refill(&mut self.trial.cost, costs);
-        self.trial.h = match problem.criterion {
-            Some(criterion) if image => {
-                self.report.compared += 1;
-                criterion.evaluate(problem.model, &self.trial.at, &mut self.trial.gradient)
-            }
-            _ => 0.0,
-        };
+        self.trial.h = problem.criterion.map_or(0.0, |criterion| {
+            self.report.compared += 1;
+            criterion.evaluate(problem.model, &self.trial.at, &mut self.trial.gradient)
+        });
     }
 
-    fn nudge(&mut self, problem: &IkProblem, image: bool, angles: &mut [f64]) {
+    fn nudge(&mut self, problem: &IkProblem, angles: &mut [f64]) {
         angles.clone_into(&mut self.saved_angles);
         self.saved_cost.clone_from(&self.here.cost);
         for (i, (angle, [low, high])) in angles.iter_mut().zip(problem.model.limits()).enumerate() {
@@ -305,7 +296,7 @@ impl IkSolver {
             *angle = if *high - *angle < *angle - *low { *angle - by } else { *angle + by }.clamp(*low, *high);
         }
         self.levels.trust.fill(0.1);
-        self.evaluate_here(problem, image, angles);
+        self.evaluate_here(problem, angles);
     }
 
     fn worse_than_saved(&self) -> bool {

@@ -10,15 +10,6 @@ const LEVEL: f64 = 1e-9;
 /// Fractions of a step that are tried in order.
 const FRACTIONS: [f64; 4] = [1.0, 0.25, 0.0625, 0.015_625];
 
-/// An unknown and its value at rest, pulled at lower priority than all goals and the images.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rest {
-    /// Index of the unknown.
-    pub unknown: usize,
-    /// Its value at rest; a value outside its limits is clamped to them.
-    pub angle: f64,
-}
-
 impl IkSolver {
     /// Takes steps towards the rest posture, each corrected by the goals. A step that makes a goal or the images worse is
     /// rejected. Few solves have a rest posture, so the function is marked cold.
@@ -38,26 +29,27 @@ impl IkSolver {
     /// Takes one step with `h` at most `most`. Returns the largest change of an unknown; zero if no step is accepted.
     fn pull_once(&mut self, problem: &IkProblem, most: f64, angles: &mut [f64]) -> f64 {
         let (n, count, limits) = (angles.len(), self.levels.ranges.len(), problem.model.limits());
+        let goals_only = problem.without_images();
         angles.clone_into(&mut self.phase_start);
         let off = rest_error(problem, angles);
         self.objections.clear();
         self.objections.reserve((n + 1) * n);
         for refused in 0..=n {
             self.rest_part(problem, angles);
-            if largest(&self.stages[count * n..]) < problem.options.still {
+            if largest(&self.stages[(count + 1) * n..]) < problem.options.still {
                 return 0.0;
             }
             for fraction in FRACTIONS {
                 for (i, [low, high]) in limits.iter().enumerate() {
-                    angles[i] = (self.phase_start[i] + fraction * self.stages[count * n + i]).clamp(*low, *high);
+                    angles[i] = (self.phase_start[i] + fraction * self.stages[(count + 1) * n + i]).clamp(*low, *high);
                 }
                 problem.model.normalize(angles);
-                self.evaluate_here(problem, false, angles);
-                let kept = self.correct_upper_levels(problem, count, false, angles);
+                self.evaluate_here(&goals_only, angles);
+                let kept = self.correct_upper_levels(&goals_only, count, angles);
                 self.objections.truncate(refused * n);
                 if kept && rest_error(problem, angles) < off {
                     if problem.criterion.is_some() {
-                        self.evaluate_here(problem, true, angles);
+                        self.evaluate_here(problem, angles);
                     }
                     if self.here.h <= most {
                         let moves = angles.iter().zip(&self.phase_start).map(|(new, old)| (new - old).abs());
@@ -71,7 +63,7 @@ impl IkSolver {
                     break;
                 }
             }
-            self.evaluate_here(problem, true, angles);
+            self.evaluate_here(problem, angles);
             // If the images rejected even the smallest step, continues along the border of the region where they are satisfied.
             if self.objections.len() == refused * n {
                 return 0.0;
@@ -94,12 +86,12 @@ impl IkSolver {
         for gradient in self.objections.chunks_exact(n.max(1)) {
             self.linear.taken.take(gradient);
         }
-        self.stages[count * n..].fill(0.0);
+        self.stages[(count + 1) * n..].fill(0.0);
         for _ in 0..=n {
             self.linear.part.fill(0.0);
-            for rest in problem.rest.iter().filter(|rest| rest.unknown < n) {
-                let now = angles[rest.unknown] + self.stages[count * n + rest.unknown];
-                self.linear.part[rest.unknown] = rest.angle - now;
+            for &(unknown, angle) in problem.rest.iter().filter(|(unknown, _)| *unknown < n) {
+                let now = angles[unknown] + self.stages[(count + 1) * n + unknown];
+                self.linear.part[unknown] = angle - now;
             }
             self.linear.taken.project(&mut self.linear.part);
             if !self.add_part(problem, count, angles) {
@@ -111,6 +103,6 @@ impl IkSolver {
 
 /// Sum of the squared differences between the angles and their rest values.
 fn rest_error(problem: &IkProblem, angles: &[f64]) -> f64 {
-    let drawn = problem.rest.iter().filter_map(|rest| angles.get(rest.unknown).map(|angle| angle - rest.angle));
+    let drawn = problem.rest.iter().filter_map(|(unknown, rest)| angles.get(*unknown).map(|angle| angle - rest));
     drawn.map(|off| off * off).sum()
 }

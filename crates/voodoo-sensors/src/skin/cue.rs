@@ -183,7 +183,7 @@ impl SkinCue {
         self.find_candidates(input, &sites, &ranges, PALM * input.eye.focal() / nearest);
         let costs = self.costs(input, &sites)?;
         let mut found = Vec::new();
-        for (row, column) in one_to_one(costs, self.candidates.len(), |column| self.candidates[column].region) {
+        for (row, column) in one_to_one(&costs, self.candidates.len(), |column| self.candidates[column].region) {
             let (site, candidate) = (&sites[row], self.candidates[column]);
             let place = self.inside(site.site, &candidate);
             let origin = input.eye.origin();
@@ -431,17 +431,13 @@ fn extent(pixels: impl Iterator<Item = [f64; 2]> + Clone) -> ([f64; 2], f64) {
 
 /// Pairs of row and column with the least costs, in that order: a row has one column, and a region, of which a column is a part,
 /// one row.
-fn one_to_one(mut costs: Vec<f64>, columns: usize, region: impl Fn(usize) -> usize) -> Vec<(usize, usize)> {
-    let mut pairs = Vec::new();
-    while let Some((index, _)) =
-        costs.iter().enumerate().filter(|(_, cost)| cost.is_finite()).min_by(|a, b| a.1.total_cmp(b.1))
-    {
-        let (row, column) = (index / columns, index % columns);
-        pairs.push((row, column));
-        for (other, cost) in costs.iter_mut().enumerate() {
-            if other / columns == row || region(other % columns) == region(column) {
-                *cost = f64::INFINITY;
-            }
+fn one_to_one(costs: &[f64], columns: usize, region: impl Fn(usize) -> usize) -> Vec<(usize, usize)> {
+    let mut open: Vec<usize> = (0..costs.len()).filter(|index| costs[*index].is_finite()).collect();
+    open.sort_by(|a, b| costs[*a].total_cmp(&costs[*b]));
+    let mut pairs: Vec<(usize, usize)> = Vec::new();
+    for (row, column) in open.into_iter().map(|index| (index / columns, index % columns)) {
+        if pairs.iter().all(|pair| pair.0 != row && region(pair.1) != region(column)) {
+            pairs.push((row, column));
         }
     }
     pairs

@@ -32,11 +32,7 @@ impl DepthBeside<'_> {
     /// Depth of what the depth camera sees where this ray has the depth `z`.
     fn look(&self, color: &Eye, ray: [f64; 2], z: f64) -> Option<f64> {
         let camera = self.eye.camera;
-        let [u, v] = self.eye.pixel(self.eye.in_sensor(color.place(ray, z))).map(f64::round);
-        if !(u >= 0.0 && v >= 0.0 && u < camera.width() as f64 && v < camera.height() as f64) {
-            return None;
-        }
-        let index = v as usize * camera.width() + u as usize;
+        let index = camera.index_of(self.eye.in_sensor(color.place(ray, z)))?;
         let depth = f64::from(self.image.get(index)) * self.meters_per_unit;
         let place = self.eye.place(camera.rays()[index].map(f64::from), depth);
         Some(color.in_sensor(place).z).filter(|z| depth > 0.0 && z.is_finite())
