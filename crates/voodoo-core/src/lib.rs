@@ -191,7 +191,7 @@ pub use body::{Body, HumanModel, Joint, JointKind, Limb, LimbRole, Roles, Side, 
 pub use camera::{Camera, Lens};
 pub use config::{Config, ConfigError, Field, Overlap, RawValue, SolverKind, Value};
 pub use detect::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
-pub use error::{BodyError, CameraError, TrackError};
+pub use error::{BodyError, TrackError, Unexpected};
 pub use observation::frame::{
     Cloud, DepthImage, DepthPixels, DetectedPerson, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope,
 };

@@ -2,7 +2,7 @@
 
 use super::{Body, Joint, JointKind};
 use crate::body::kinematics::joint_turn;
-use crate::error::TrackError;
+use crate::error::{TrackError, Unexpected};
 use crate::math::{Mat3, Moments, Pose, Quat, Vec3, is_place};
 
 /// A hinge bent by less than this does not determine its axis: sine of the angle between its limbs.
@@ -48,7 +48,7 @@ impl Body {
     pub fn fit(&self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<(Self, Vec<Pose>), TrackError> {
         for (site, position) in positions {
             let (what, found) = (format_args!("joints[{}]", self.sites()[*site].name), format_args!("{position:?}"));
-            TrackError::unless(is_place(*position), what, "finite meters, 1e9 at most", found)?;
+            Unexpected::unless(is_place(*position), what, "finite meters, 1e9 at most", found)?;
         }
         let farthest = positions.iter().map(|(_, position)| position.abs().max_element()).fold(0.0, f64::max);
         if farthest <= NEAR_ORIGIN {
@@ -70,7 +70,7 @@ impl Body {
         let world_from_rest = body.overall_orientation(positions)?;
         let expected = "meters, between a tenth and ten times the body's own distances";
         let plausible = (1.0 / LARGEST..=LARGEST).contains(&scale);
-        TrackError::unless(plausible, "joints", expected, format_args!("{scale:.4} times"))?;
+        Unexpected::unless(plausible, "joints", expected, format_args!("{scale:.4} times"))?;
         let rest = body.rest_pose(Pose::IDENTITY);
         let mut poses: Vec<Pose> = Vec::with_capacity(rest.len());
         for limb in 0..rest.len() {

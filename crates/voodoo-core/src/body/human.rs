@@ -1,7 +1,7 @@
 //! The default humans: proportions as fractions of the stature, standing with hanging arms at rest.
 
 use super::{Body, Joint, Limb, Site};
-use crate::error::BodyError;
+use crate::error::{BodyError, Unexpected};
 use crate::math::{Mat3, Pose, Quat, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
@@ -324,7 +324,7 @@ impl Body {
     /// Limb frames have z from the proximal to the distal end, x forward (feet: up) in the standing pose. Hinges rotate about the
     /// joint frame's x axis; a positive angle is flexion.
     pub fn human(stature: f64, model: HumanModel) -> Result<Self, BodyError> {
-        BodyError::unless((0.3..=3.0).contains(&stature), "stature", "meters from 0.3 to 3.0", stature)?;
+        Unexpected::unless((0.3..=3.0).contains(&stature), "stature", "meters from 0.3 to 3.0", stature)?;
         let papers = model == HumanModel::Papers;
         let build = if model == HumanModel::Measured { &MEASURED } else { &ANSUR };
         let (limbs, poses, sites) = Default::default();

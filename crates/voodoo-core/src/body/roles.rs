@@ -4,7 +4,7 @@
 //! and features that need roles are disabled for it.
 
 use super::{Limb, Site};
-use crate::error::BodyError;
+use crate::error::Unexpected;
 
 /// Side of the body, as the person's own left or right; see [`Roles`] for an example.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -151,9 +151,9 @@ impl Roles {
     /// Resolves the names of a body in which parents precede their children.
     ///
     /// # Errors
-    /// [`BodyError::Value`] when a limb and its joint are named after different sides, or when a joint of an arm or leg does not
+    /// [`Unexpected`] when a limb and its joint are named after different sides, or when a joint of an arm or leg does not
     /// follow the preceding one. Detections and statistics of human joints would otherwise be applied to the wrong limbs.
-    pub(super) fn resolve<'a>(limbs: &'a [Limb], sites: &[Site]) -> Result<Self, BodyError> {
+    pub(super) fn resolve<'a>(limbs: &'a [Limb], sites: &[Site]) -> Result<Self, Unexpected> {
         let joint_name = |limb: &'a Limb| limb.parent.as_ref().map(|(_, joint)| joint.name.as_str());
         let site = |name: &str| sites.iter().position(|site| site.name == name);
         let roles = Self {
@@ -166,7 +166,7 @@ impl Roles {
         Ok(roles)
     }
 
-    fn check(&self, limbs: &[Limb], sites: &[Site]) -> Result<(), BodyError> {
+    fn check(&self, limbs: &[Limb], sites: &[Site]) -> Result<(), Unexpected> {
         let parent = |limb: usize| limbs[limb].parent.as_ref().map(|(parent, _)| *parent);
         let opposite = |limb: usize, name: &str| {
             let sides = self.limb(limb).and(Side::of(&limbs[limb].name)).zip(Side::of(name));
@@ -175,17 +175,17 @@ impl Roles {
         for (index, limb) in limbs.iter().enumerate() {
             let (Some((hangs_on, joint)), Some(role)) = (&limb.parent, self.joints[index]) else { continue };
             let key = format_args!("limbs.{}.joint.name", limb.name);
-            BodyError::unless(!opposite(index, &joint.name), key, "a joint of the limb's own side", &joint.name)?;
+            Unexpected::unless(!opposite(index, &joint.name), key, "a joint of the limb's own side", &joint.name)?;
             // A second joint of the same name belongs to another limb that is attached there.
             let Some((before, expected)) = role.after().filter(|_| self.limb_at(role) == Some(index)) else { continue };
             let Some(before) = self.limb_at(before) else { continue };
             let follows = std::iter::successors(Some(*hangs_on), |limb| parent(*limb)).any(|limb| limb == before);
-            BodyError::unless(follows, key, expected, format_args!("{} on {}", joint.name, limbs[*hangs_on].name))?;
+            Unexpected::unless(follows, key, expected, format_args!("{} on {}", joint.name, limbs[*hangs_on].name))?;
         }
         for site in sites {
             let (key, found) = (format_args!("sites.{}.limb", site.name), &limbs[site.limb].name);
             let valid = JointRole::from_name(&site.name).is_none() || !opposite(site.limb, &site.name);
-            BodyError::unless(valid, key, "a limb of the site's own side", found)?;
+            Unexpected::unless(valid, key, "a limb of the site's own side", found)?;
         }
         Ok(())
     }
@@ -255,6 +255,7 @@ fn groups<'a>(limbs: &'a [Limb]) -> Vec<u16> {
 mod tests {
     use super::*;
     use crate::body::{Body, HumanModel, Joint};
+    use crate::error::BodyError;
     use crate::math::{Pose, Vec3};
     use crate::shape::TaperedEllipticCylinder;
 

@@ -10,7 +10,7 @@ mod report;
 use crate::body::{Body, Model};
 use crate::config::Config;
 use crate::detect::{Detect, DetectError, Detected, PlacedDetection};
-use crate::error::TrackError;
+use crate::error::{TrackError, Unexpected};
 use crate::fit::{Fit, Motion, Setting};
 use crate::hypotheses::Hypotheses;
 use crate::math::{Pose, Vec3, is_rigid, refill};
@@ -111,14 +111,10 @@ impl BodyTracker {
 
     /// Sets the pose of every limb directly.
     pub(crate) fn reset_pose(&mut self, world_from_limb: &[Pose]) -> Result<&Estimate, TrackError> {
-        let count = self.model.body.limbs().len();
-        if world_from_limb.len() != count || !world_from_limb.iter().all(is_rigid) {
-            return Err(TrackError::measurement(
-                "world_from_limb",
-                "one rigid pose a limb",
-                format!("{} pose(s) for {count} limbs", world_from_limb.len()),
-            ));
-        }
+        let [poses, limbs] = [world_from_limb.len(), self.model.body.limbs().len()];
+        let valid = poses == limbs && world_from_limb.iter().all(is_rigid);
+        let found = format_args!("{poses} pose(s) for {limbs} limbs");
+        Unexpected::unless(valid, "world_from_limb", "one rigid pose a limb", found)?;
         self.restart(self.model.body.clone(), world_from_limb.to_vec(), Start::SizesKnown);
         self.relocalizer.forget();
         Ok(&self.estimate)

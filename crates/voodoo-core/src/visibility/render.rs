@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::body::Body;
 use crate::camera::Camera;
-use crate::error::TrackError;
+use crate::error::{TrackError, Unexpected};
 use crate::math::{LANES, Pose, Vec3, is_rigid, refill, reset, vectorized};
 use crate::observation::frame::check_pose;
 use crate::shape::TaperedEllipticCylinder;
@@ -116,7 +116,7 @@ impl Rendering {
         let [poses, limbs] = [world_from_limb.len(), body.limbs().len()];
         let found = format_args!("{poses} poses for {limbs} limbs, or one not finite");
         let valid = poses == limbs && world_from_limb.iter().all(is_rigid);
-        TrackError::unless(valid, "world_from_limb", "one rigid pose a limb", found)?;
+        Unexpected::unless(valid, "world_from_limb", "one rigid pose a limb", found)?;
         let Self { width, depth, limb, raycasters } = self;
         *width = view.camera.width();
         reset(depth, view.camera.pixels(), 0.0);
