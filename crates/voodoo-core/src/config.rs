@@ -2,49 +2,41 @@
 //!
 //! The Python package builds its validated `Config` class and the commented TOML from [`Config::fields`].
 
-/// A configuration entry that is unknown or outside its range.
-///
-/// ```
-/// use voodoo_core::{Config, ConfigError, RawValue};
-///
-/// let mut config = Config::default();
-/// config.set("solver", &RawValue::Word("tree".into()))?;
-/// let refused = config.set("threads", &RawValue::Number(0.0));
-/// assert!(matches!(refused, Err(ConfigError::Value { key: "threads", .. })));
-/// assert_eq!(config.threads, 1);
-/// # Ok::<(), ConfigError>(())
-/// ```
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ConfigError {
-    /// No such key.
-    #[error("unknown configuration key {0:?}")]
-    UnknownKey(String),
-    /// An invalid value.
-    #[error("{key}: expected {expected}, found {found:?}")]
-    Value {
-        /// The key.
-        key: &'static str,
-        /// The expected value.
-        expected: String,
-        /// The value found.
-        found: RawValue,
-    },
-}
+use crate::error::Unexpected;
 
 /// A value of a configuration entry.
 ///
-/// [`Field`] has an example.
+/// ```
+/// use voodoo_core::{Config, Value};
+///
+/// let mut config = Config::default();
+/// config.set("solver", &Value::Word("tree".into()))?;
+/// let refused = config.set("threads", &Value::Whole(0)).unwrap_err();
+/// assert_eq!(refused.to_string(), "threads: expected a whole number from 1 to 256, found Whole(0)");
+/// assert_eq!(config.threads, 1);
+/// # Ok::<(), voodoo_core::Unexpected>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(untagged))]
 pub enum Value {
-    /// A real number.
-    Real(f64),
-    /// A whole number.
-    Whole(usize),
     /// A Boolean.
     Switch(bool),
+    /// A whole number.
+    Whole(usize),
+    /// A real number.
+    Real(f64),
     /// One of several keywords.
-    Word(&'static str),
+    Word(String),
+}
+
+impl Value {
+    fn number(&self) -> Option<f64> {
+        match self {
+            Self::Whole(number) => Some(*number as f64),
+            Self::Real(number) => Some(*number),
+            _ => None,
+        }
+    }
 }
 
 /// Description of a configuration entry.
@@ -84,13 +76,13 @@ trait Entry: Sized {
     const EXPECTED: &'static str;
     const WORDS: &'static [&'static str] = &[];
     fn value(&self) -> Value;
-    fn parse(value: &RawValue) -> Option<Self>;
+    fn parse(value: &Value) -> Option<Self>;
 }
 
 /// A value from outside as an entry, checked for type and range.
-fn parsed<T: Entry>(key: &'static str, value: &RawValue, range: Option<(f64, f64)>) -> Result<T, ConfigError> {
-    let within = match (value, range) {
-        (RawValue::Number(number), Some((low, high))) => (low..=high).contains(number),
+fn parsed<T: Entry>(key: &'static str, value: &Value, range: Option<(f64, f64)>) -> Result<T, Unexpected> {
+    let within = match (value.number(), range) {
+        (Some(number), Some((low, high))) => (low..=high).contains(&number),
         _ => true,
     };
     T::parse(value).filter(|_| within).ok_or_else(|| {
@@ -98,21 +90,8 @@ fn parsed<T: Entry>(key: &'static str, value: &RawValue, range: Option<(f64, f64
             Some((low, high)) => format!("{} from {low} to {high}", T::EXPECTED),
             None => format!("{}{}", T::EXPECTED, T::WORDS.join(", ")),
         };
-        ConfigError::Value { key, expected, found: value.clone() }
+        Unexpected::new(key, expected, format_args!("{value:?}"))
     })
-}
-
-/// A value from outside, not yet validated.
-///
-/// [`ConfigError`] has an example.
-#[derive(Clone, Debug, PartialEq)]
-pub enum RawValue {
-    /// A number.
-    Number(f64),
-    /// A Boolean.
-    Switch(bool),
-    /// A keyword.
-    Word(String),
 }
 
 impl Entry for f64 {
@@ -120,11 +99,8 @@ impl Entry for f64 {
     fn value(&self) -> Value {
         Value::Real(*self)
     }
-    fn parse(value: &RawValue) -> Option<Self> {
-        match value {
-            RawValue::Number(number) if number.is_finite() => Some(*number),
-            _ => None,
-        }
+    fn parse(value: &Value) -> Option<Self> {
+        value.number().filter(|number| number.is_finite())
     }
 }
 
@@ -133,13 +109,9 @@ impl Entry for usize {
     fn value(&self) -> Value {
         Value::Whole(*self)
     }
-    fn parse(value: &RawValue) -> Option<Self> {
-        match value {
-            RawValue::Number(number) if *number >= 0.0 && number.fract() == 0.0 && *number < 1e9 => {
-                Some(*number as usize)
-            }
-            _ => None,
-        }
+    fn parse(value: &Value) -> Option<Self> {
+        let whole = value.number().filter(|number| *number >= 0.0 && number.fract() == 0.0 && *number < 1e9);
+        whole.map(|number| number as usize)
     }
 }
 
@@ -148,9 +120,9 @@ impl Entry for bool {
     fn value(&self) -> Value {
         Value::Switch(*self)
     }
-    fn parse(value: &RawValue) -> Option<Self> {
+    fn parse(value: &Value) -> Option<Self> {
         match value {
-            RawValue::Switch(switch) => Some(*switch),
+            Value::Switch(switch) => Some(*switch),
             _ => None,
         }
     }
@@ -168,11 +140,11 @@ macro_rules! words {
             const EXPECTED: &'static str = "one of ";
             const WORDS: &'static [&'static str] = &[$($word),+];
             fn value(&self) -> Value {
-                Value::Word(match self { $(Self::$variant => $word),+ })
+                Value::Word(match self { $(Self::$variant => $word),+ }.to_owned())
             }
-            fn parse(value: &RawValue) -> Option<Self> {
+            fn parse(value: &Value) -> Option<Self> {
                 match value {
-                    $(RawValue::Word(word) if word == $word => Some(Self::$variant),)+
+                    $(Value::Word(word) if word == $word => Some(Self::$variant),)+
                     _ => None,
                 }
             }
@@ -218,12 +190,12 @@ macro_rules! config {
             }
 
             /// Sets one entry, checked for type and range.
-            pub fn set(&mut self, key: &str, value: &RawValue) -> Result<(), ConfigError> {
+            pub fn set(&mut self, key: &str, value: &Value) -> Result<(), Unexpected> {
                 match key {
                     $(stringify!($name) => {
                         self.$name = parsed(stringify!($name), value, config!(@range $($low $high)?))?;
                     })+
-                    _ => return Err(ConfigError::UnknownKey(key.to_owned())),
+                    _ => return Err(Unexpected::new("key", "one of the configuration", format_args!("{key:?}"))),
                 }
                 Ok(())
             }

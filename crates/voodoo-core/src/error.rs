@@ -4,7 +4,7 @@ use std::fmt::Display;
 
 use crate::shape::ShapeError;
 
-/// What is not as expected: an entry of a body, a number of a camera, or a measurement.
+/// What is not as expected: an entry of a body, a number of a camera, a parameter, or a measurement.
 ///
 /// ```
 /// use voodoo_core::Camera;
@@ -18,19 +18,19 @@ pub struct Unexpected {
     /// Name of the entry or the argument.
     pub what: String,
     /// What was expected.
-    pub expected: &'static str,
+    pub expected: String,
     /// What was found.
     pub found: String,
 }
 
 impl Unexpected {
     /// The name of an entry or argument, what was expected and what was found.
-    pub fn new(what: impl Display, expected: &'static str, found: impl Display) -> Self {
-        Self { what: what.to_string(), expected, found: found.to_string() }
+    pub fn new(what: impl Display, expected: impl Display, found: impl Display) -> Self {
+        Self { what: what.to_string(), expected: expected.to_string(), found: found.to_string() }
     }
 
     /// Rejects what is not valid; the texts are made only then.
-    pub fn unless(valid: bool, what: impl Display, expected: &'static str, found: impl Display) -> Result<(), Self> {
+    pub fn unless(valid: bool, what: impl Display, expected: impl Display, found: impl Display) -> Result<(), Self> {
         if valid { Ok(()) } else { Err(Self::new(what, expected, found)) }
     }
 }

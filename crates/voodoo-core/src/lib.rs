@@ -189,7 +189,7 @@ pub mod kinematics {
 
 pub use body::{Body, HumanModel, Joint, JointKind, Limb, LimbRole, Roles, Side, Site};
 pub use camera::{Camera, Lens};
-pub use config::{Config, ConfigError, Field, Overlap, RawValue, SolverKind, Value};
+pub use config::{Config, Field, Overlap, SolverKind, Value};
 pub use detect::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 pub use error::{BodyError, TrackError, Unexpected};
 pub use observation::frame::{

@@ -7,7 +7,7 @@
 use crate::scene;
 use std::time::{Duration, Instant};
 
-use voodoo_core::RawValue;
+use voodoo_core::Value;
 use voodoo_core::math::{Aabb, Pose, Quat, Vec3};
 use voodoo_core::{Body, Config, Estimate, Status, TaperedEllipticCylinder, Tracker};
 use voodoo_core::{Camera, Lens};
@@ -152,10 +152,10 @@ fn configurations(from: &mut Hostile) {
     let fields = config.fields();
     let field = &fields[from.below(fields.len())];
     let value = match from.below(4) {
-        0 => RawValue::Number(from.number(10.0)),
-        1 => RawValue::Switch(true),
-        2 => RawValue::Word("chain".into()),
-        _ => RawValue::Number(ODD[from.below(ODD.len())]),
+        0 => Value::Real(from.number(10.0)),
+        1 => Value::Switch(true),
+        2 => Value::Word("chain".into()),
+        _ => Value::Real(ODD[from.below(ODD.len())]),
     };
     let before = config.clone();
     if config.set(field.name, &value).is_err() {

@@ -1,8 +1,11 @@
 //! The table of configuration entries, and a core configuration from plain values.
 
+use std::collections::HashMap;
+
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use voodoo_core::{Config, RawValue, Value};
+use pythonize::{depythonize, pythonize};
+use voodoo_core::{Config, Field, Value};
 
 use crate::errors::ConfigError;
 
@@ -12,32 +15,19 @@ type FieldRow<'py> = (&'static str, String, &'static str, Bound<'py, PyAny>, Opt
 #[doc = stub!("config_fields")]
 #[pyfunction]
 pub(crate) fn config_fields(py: Python<'_>) -> PyResult<Vec<FieldRow<'_>>> {
-    Config::default()
-        .fields()
-        .into_iter()
-        .map(|field| {
-            let default = match field.default {
-                Value::Real(number) => number.into_pyobject(py)?.into_any(),
-                Value::Whole(number) => number.into_pyobject(py)?.into_any(),
-                Value::Switch(switch) => switch.into_pyobject(py)?.to_owned().into_any(),
-                Value::Word(word) => word.into_pyobject(py)?.into_any(),
-            };
-            Ok((field.name, field.doc, field.unit, default, field.range, field.words.to_vec()))
-        })
-        .collect()
+    let row = |Field { name, doc, unit, default, range, words }| {
+        Ok((name, doc, unit, pythonize(py, &default)?, range, words.to_vec()))
+    };
+    Config::default().fields().into_iter().map(row).collect()
 }
 
 /// A configuration from the values of a dictionary.
 pub(crate) fn config(values: &Bound<'_, PyDict>) -> PyResult<Config> {
+    let refused = |error: String| ConfigError::new_err(error);
+    let values: HashMap<String, Value> = depythonize(values).map_err(|error| refused(error.to_string()))?;
     let mut config = Config::default();
-    for (key, value) in values.iter() {
-        let key: String = key.extract()?;
-        let number = |_| value.extract().map(RawValue::Number);
-        let word = |_: PyErr| value.extract().map(RawValue::Word);
-        let raw = value.extract().map(RawValue::Switch).or_else(number).or_else(word);
-        let wrong = || format!("{key}: expected a number, a switch or a word, found {value}");
-        let raw = raw.map_err(|_: PyErr| ConfigError::new_err(wrong()))?;
-        config.set(&key, &raw).map_err(|error| ConfigError::new_err(error.to_string()))?;
+    for (key, value) in &values {
+        config.set(key, value).map_err(|error| refused(error.to_string()))?;
     }
     Ok(config)
 }

@@ -9,7 +9,7 @@
 use std::f64::consts::{PI, TAU};
 
 use voodoo_core::Camera;
-use voodoo_core::RawValue;
+use voodoo_core::Value;
 use voodoo_core::math::{Pose, Quat, Vec3};
 use voodoo_core::{Body, Config, Estimate};
 use voodoo_core::{Cloud, DepthImage, DepthPixels, Frame, PointSlice, Scope};
@@ -192,7 +192,7 @@ pub(crate) fn every_solver() -> Vec<Config> {
     let words = fields.iter().find(|field| field.name == "solver").map_or(&[] as &[&str], |field| field.words);
     let with = |word: &&str| {
         let mut config = Config::default();
-        config.set("solver", &RawValue::Word((*word).to_owned())).unwrap();
+        config.set("solver", &Value::Word((*word).to_owned())).unwrap();
         config
     };
     words.iter().map(with).collect()
