@@ -16,8 +16,8 @@ use crate::error::Unexpected;
 /// assert_eq!(config.threads, 1);
 /// # Ok::<(), voodoo_core::Unexpected>(())
 /// ```
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(untagged))]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(untagged)]
 pub enum Value {
     /// A Boolean.
     Switch(bool),

@@ -228,7 +228,7 @@ impl Roles {
 }
 
 /// Splits a name into its side and the rest.
-fn split(name: &str) -> (Option<Side>, &str) {
+pub(super) fn split(name: &str) -> (Option<Side>, &str) {
     match (name.strip_prefix("l_"), name.strip_prefix("r_")) {
         (Some(stem), _) => (Some(Side::Left), stem),
         (_, Some(stem)) => (Some(Side::Right), stem),
