@@ -95,24 +95,6 @@ impl Template {
     }
 }
 
-/// Appends a whole number, which takes a fifth of the time of `write!`.
-fn write_whole(text: &mut Vec<u8>, number: i64) {
-    if number < 0 {
-        text.push(b'-');
-    }
-    let (mut left, start) = (number.unsigned_abs(), text.len());
-    loop {
-        text.push(b'0' + (left % 10) as u8);
-        left /= 10;
-        if left == 0 {
-            break;
-        }
-    }
-    if let Some(digits) = text.get_mut(start..) {
-        digits.reverse();
-    }
-}
-
 /// The words of a person in a text: status, residual, and status of the limbs.
 fn words<'a>(py: Python<'_>, one: &'a PyEstimate) -> impl Iterator<Item = Cow<'static, str>> + use<'a> {
     let limbs = &one.estimate.limb_status;
@@ -135,7 +117,7 @@ pub(crate) fn people_text<'py>(
     let wrong = || MeasurementError::new_err("text: expected places for all numbers and words, found fewer or more");
     let mut numbers = all(&numbers).into_iter();
     let mut words = std::iter::once(format!("{stamp:?}").into()).chain(estimates.iter().flat_map(|one| words(py, one)));
-    let mut written = Vec::with_capacity(2 * text.len());
+    let (mut written, mut digits) = (Vec::with_capacity(2 * text.len()), itoa::Buffer::new());
     for part in text.split_inclusive(|&byte| byte <= 2) {
         let (&last, before) = part.split_last().unwrap_or((&b' ', part));
         written.extend_from_slice(if last <= 2 { before } else { part });
@@ -143,7 +125,7 @@ pub(crate) fn people_text<'py>(
             written.extend_from_slice(words.next().ok_or_else(wrong)?.as_bytes());
         } else if last <= 2 {
             let number = numbers.next().ok_or_else(wrong)? * if last == 0 { 1e5 } else { 1e6 };
-            write_whole(&mut written, number.round_ties_even() as i64);
+            written.extend_from_slice(digits.format(number.round_ties_even() as i64).as_bytes());
         }
     }
     if words.next().is_some() || numbers.next().is_some() {
