@@ -90,7 +90,7 @@ impl Layout {
         estimates: Vec<PyRef<'py, PyEstimate>>,
         bodies: Vec<PyRef<'py, PyBody>>,
         turn: Option<PyReadonlyArray2<'py, f64>>,
-    ) -> PyResult<(Array<'py>, Vec<bool>)> {
+    ) -> PyResult<Array<'py>> {
         let turn = turn.as_ref().map(|turn| turn.as_slice()).transpose()?.and_then(|turn| turn.first_chunk());
         let (turn, shift) = turn.map_or((Mat3::IDENTITY, Vec3::ZERO), parts);
         let (mut rows, unknown) = (Vec::new(), [[f64::NAN; 6]; 6]);
@@ -102,11 +102,7 @@ impl Layout {
             let row = self.append(&mut rows, &body.0, &poses.collect::<Vec<_>>(), &joints, (covariance, &turn));
             row.ok_or_else(unplanned)?;
         }
-        let sure = |one: &PyRef<'_, PyEstimate>| {
-            one.estimate.covariances.limbs.first().is_some_and(|root| root[0][0].is_finite())
-        };
-        let (count, sure) = (estimates.len(), estimates.iter().map(sure).collect());
-        let columns = rows.len() / count.max(1);
-        Ok((array(py, rows, &[count, columns])?, sure))
+        let (count, columns) = (estimates.len(), rows.len() / estimates.len().max(1));
+        array(py, rows, &[count, columns])
     }
 }
