@@ -52,14 +52,6 @@ impl Unexpected {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BodyError {
-    /// Two limbs or two sites share a name.
-    #[error("{key}: the name {name:?} is already taken")]
-    Duplicate {
-        /// Key of the second one.
-        key: String,
-        /// The name.
-        name: String,
-    },
     /// A name that is not in the body.
     #[error("{what}: unknown {what} {name:?}; known are: {}", known.join(", "))]
     Unknown {

@@ -196,7 +196,7 @@ impl Body {
         distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(closest, _)| closest)
     }
 
-    fn check(&self) -> Result<(), BodyError> {
+    fn check(&self) -> Result<(), Unexpected> {
         Unexpected::unless(!self.limbs.is_empty(), "body", "at least one limb", "none")?;
         let (limbs, sites) = (self.limbs.len(), self.sites.len());
         let (fits, found) = (limbs <= MOST_LIMBS && sites <= MOST_SITES, format_args!("{limbs} and {sites}"));
@@ -230,13 +230,11 @@ fn check_name<'a>(
     key: impl Display,
     name: &str,
     mut before: impl Iterator<Item = &'a String>,
-) -> Result<(), BodyError> {
+) -> Result<(), Unexpected> {
     Unexpected::unless(!name.is_empty(), &key, "a name", "an empty one")?;
     check_letters(&key, name)?;
-    if before.any(|known| known == name) {
-        return Err(BodyError::Duplicate { key: key.to_string(), name: name.into() });
-    }
-    Ok(())
+    let is_new = !before.any(|known| known == name);
+    Unexpected::unless(is_new, key, "a name of its own", format_args!("{name:?}, which is already taken"))
 }
 
 /// Rejects characters that break file formats: tabs and line breaks separate table cells, braces delimit trees of bones.
