@@ -218,25 +218,22 @@ impl Body {
 
     /// The axis of a hinge at the distal end of a limb: in the limb frame, and in the world as the bent child determines it.
     fn hinge_axis(&self, limb: usize, positions: &[(usize, Vec3)]) -> Option<(Vec3, Vec3)> {
-        for (index, parent, joint) in self.joints() {
-            if parent != limb || joint.kind() != JointKind::Hinge {
-                continue;
-            }
-            let center = self.roles.joint_site(index);
-            let (start, bend) = (measured(self.roles.joint_site(limb), positions)?, measured(center, positions)?);
-            let own = |site: &usize| self.sites()[*site].limb == index && Some(*site) != center;
-            let end = (0..self.sites().len()).filter(own).find_map(|site| measured(Some(site), positions));
-            // If the child has no site of its own, the joint of its own child gives its direction: a hand's wrist.
-            let end = end.or_else(|| {
-                let away = |local: Vec3| (local - joint.limb_from_joint.translation).length();
-                let landmarks = self.known_landmarks(index, positions).into_iter();
-                let far = landmarks.filter(|(local, _)| away(*local) > FAR_END * self.limbs[index].shape.length());
-                far.max_by(|a, b| away(a.0).total_cmp(&away(b.0))).map(|(_, position)| position)
-            })?;
-            let normal = (bend - start).normalize_or_zero().cross((end - bend).normalize_or_zero());
-            return (normal.length() > BENT).then(|| (joint.parent_from_joint.rotation * Vec3::X, normal.normalize()));
-        }
-        None
+        let is_at_end =
+            |(_, parent, joint): &(usize, usize, &Joint)| *parent == limb && joint.kind() == JointKind::Hinge;
+        let (index, _, joint) = self.joints().find(is_at_end)?;
+        let center = self.roles.joint_site(index);
+        let (start, bend) = (measured(self.roles.joint_site(limb), positions)?, measured(center, positions)?);
+        let own = |site: &usize| self.sites()[*site].limb == index && Some(*site) != center;
+        let end = (0..self.sites().len()).filter(own).find_map(|site| measured(Some(site), positions));
+        // If the child has no site of its own, the joint of its own child gives its direction: a hand's wrist.
+        let end = end.or_else(|| {
+            let away = |local: Vec3| (local - joint.limb_from_joint.translation).length();
+            let landmarks = self.known_landmarks(index, positions).into_iter();
+            let far = landmarks.filter(|(local, _)| away(*local) > FAR_END * self.limbs[index].shape.length());
+            far.max_by(|a, b| away(a.0).total_cmp(&away(b.0))).map(|(_, position)| position)
+        })?;
+        let normal = (bend - start).normalize_or_zero().cross((end - bend).normalize_or_zero());
+        (normal.length() > BENT).then(|| (joint.parent_from_joint.rotation * Vec3::X, normal.normalize()))
     }
 
     /// Moves the landmarks of a limb to their measured positions and stretches its shape accordingly.
