@@ -29,9 +29,6 @@ impl PyView {
         let [height, width] = [distance.shape()[0], distance.shape()[1]];
         let size = format_args!("{width} x {height}");
         unless(width >= 2 && height >= 2, "silhouette", "at least 2 x 2 pixels", size)?;
-        let valid = [camera.height(), camera.width()] == [height, width] && !camera.distorts();
-        let expected = format_args!("a pinhole camera of {size} pixels");
-        unless(valid, "camera", expected, format_args!("{camera:?}"))?;
         Ok(Self(SilhouetteView {
             pixels: distance.as_slice()?.iter().zip(thickness.as_slice()?).map(|(d, t)| [*d, *t]).collect(),
             depth: depth.map_or(Ok(Vec::new()), |depth| depth.as_slice().map(<[f32]>::to_vec))?,
