@@ -44,7 +44,7 @@ mod _core {
         body::PyBody,
         camera::{PyCamera, render_depth},
         config::config_fields,
-        estimate::{_estimate, _nobody, PyEstimate},
+        estimate::{_estimate, PyEstimate},
         frame::PyFrame,
         ik::PyChain,
         ik_view::PyView,
