@@ -107,12 +107,6 @@ pub enum TrackError {
     /// A measurement with a value that cannot be used.
     #[error(transparent)]
     Measurement(#[from] Unexpected),
-    /// The given joint positions do not determine the pose.
-    #[error("joints: expected at least three positions that do not lie on a line, found {found} position(s)")]
-    Underdetermined {
-        /// Number of given positions.
-        found: usize,
-    },
     /// A problem with the body.
     #[error(transparent)]
     Body(#[from] BodyError),

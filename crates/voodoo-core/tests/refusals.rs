@@ -151,9 +151,10 @@ fn a_refused_reset_changes_nothing() {
     tracker.step(&scene::with_cloud(1.0, &[scene::cloud(&points)])).unwrap();
     let before = scene::bits(tracker.estimate());
     let body = tracker.body().clone();
-    assert!(matches!(tracker.reset(&[(0, Vec3::ZERO)], true), Err(TrackError::Underdetermined { .. })));
+    let underdetermined = |error: TrackError| error.to_string().contains("three positions that do not lie on a line");
+    assert!(underdetermined(tracker.reset(&[(0, Vec3::ZERO)], true).unwrap_err()));
     let line = [0, 1, 2].map(|index| (index, Vec3::Z * index as f64));
-    assert!(matches!(tracker.reset(&line, true), Err(TrackError::Underdetermined { .. })));
+    assert!(underdetermined(tracker.reset(&line, true).unwrap_err()));
     assert!(tracker.reset(&[(99, Vec3::ZERO)], true).unwrap_err().to_string().contains("99"));
     assert!(tracker.reset(&[(0, Vec3::NAN); 3], true).unwrap_err().to_string().contains("humanoid_root"));
     let millimeters: Vec<_> = sites_of(&tracker).into_iter().map(|(site, place)| (site, place * 1000.0)).collect();

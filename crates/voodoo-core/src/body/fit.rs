@@ -46,8 +46,10 @@ impl Body {
     /// between known landmarks of the same limb; then every limb is stretched and its landmarks are moved to the measured
     /// positions. Positions that require a scale above ten or below a tenth are rejected.
     pub fn fit(&self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<(Self, Vec<Pose>), TrackError> {
-        for (site, position) in positions {
-            let (what, found) = (format_args!("joints[{}]", self.sites()[*site].name), format_args!("{position:?}"));
+        for (index, position) in positions {
+            let unknown = || Unexpected::new("joints", "the index of a site", index);
+            let site = self.sites.get(*index).ok_or_else(unknown)?;
+            let (what, found) = (format_args!("joints[{}]", site.name), format_args!("{position:?}"));
             Unexpected::unless(is_place(*position), what, "finite meters, 1e9 at most", found)?;
         }
         let farthest = positions.iter().map(|(_, position)| position.abs().max_element()).fold(0.0, f64::max);
@@ -176,7 +178,8 @@ impl Body {
                 }
             }
         }
-        Err(TrackError::Underdetermined { found: positions.len() })
+        let expected = "at least three positions that do not lie on a line";
+        Err(Unexpected::new("joints", expected, format_args!("{} position(s)", positions.len())).into())
     }
 
     fn orient_limb(
