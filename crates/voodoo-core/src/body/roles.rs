@@ -112,16 +112,14 @@ roles! {
 }
 
 impl JointRole {
-    /// The preceding joint of the same arm or leg, and the resulting requirement for the body as a message.
-    fn after(self) -> Option<(Self, &'static str)> {
+    /// The preceding joint of the same arm or leg.
+    fn before(self) -> Option<Self> {
         match self {
-            Self::Shoulder(side) => {
-                Some((Self::Sternoclavicular(side), "a shoulder beyond the sternoclavicular joint of its side"))
-            }
-            Self::Elbow(side) => Some((Self::Shoulder(side), "an elbow beyond the shoulder of its side")),
-            Self::Wrist(side) => Some((Self::Elbow(side), "a wrist beyond the elbow of its side")),
-            Self::Knee(side) => Some((Self::Hip(side), "a knee beyond the hip of its side")),
-            Self::Ankle(side) => Some((Self::Knee(side), "an ankle beyond the knee of its side")),
+            Self::Shoulder(side) => Some(Self::Sternoclavicular(side)),
+            Self::Elbow(side) => Some(Self::Shoulder(side)),
+            Self::Wrist(side) => Some(Self::Elbow(side)),
+            Self::Knee(side) => Some(Self::Hip(side)),
+            Self::Ankle(side) => Some(Self::Knee(side)),
             _ => None,
         }
     }
@@ -177,9 +175,10 @@ impl Roles {
             let key = format_args!("limbs.{}.joint.name", limb.name);
             Unexpected::unless(!opposite(index, &joint.name), key, "a joint of the limb's own side", &joint.name)?;
             // A second joint of the same name belongs to another limb that is attached there.
-            let Some((before, expected)) = role.after().filter(|_| self.limb_at(role) == Some(index)) else { continue };
-            let Some(before) = self.limb_at(before) else { continue };
+            let before = role.before().filter(|_| self.limb_at(role) == Some(index));
+            let Some(before) = before.and_then(|before| self.limb_at(before)) else { continue };
             let follows = std::iter::successors(Some(*hangs_on), |limb| parent(*limb)).any(|limb| limb == before);
+            let expected = format_args!("a joint of a limb that hangs on {}", limbs[before].name);
             Unexpected::unless(follows, key, expected, format_args!("{} on {}", joint.name, limbs[*hangs_on].name))?;
         }
         for site in sites {
@@ -386,7 +385,7 @@ mod tests {
         );
         assert_eq!(
             refused(&[["torso", ""], ["low", "l_elbow"], ["high", "l_shoulder"]]),
-            "limbs.low.joint.name: expected an elbow beyond the shoulder of its side, found l_elbow on torso"
+            "limbs.low.joint.name: expected a joint of a limb that hangs on high, found l_elbow on torso"
         );
         // Without its shoulder, an elbow may be attached anywhere.
         assert!(chain(&[["torso", ""], ["low", "l_elbow"], ["high", "r_shoulder"]]).is_ok());
