@@ -21,7 +21,6 @@ mod errors;
 mod estimate;
 mod frame;
 mod ik;
-mod ik_view;
 mod keypoints;
 mod layout;
 mod people;
@@ -46,8 +45,7 @@ mod _core {
         config::config_fields,
         estimate::{_estimate, PyEstimate},
         frame::PyFrame,
-        ik::PyChain,
-        ik_view::PyView,
+        ik::{PyChain, PyView},
         keypoints::{PyKeypointLayout, carried, linear_sum_assignment, nearest_surface},
         layout::Layout,
         people::PyPeople,

@@ -4,11 +4,11 @@ use numpy::{PyReadonlyArray2, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use std::f64::consts::PI;
 use voodoo_core::math::{self, Mat3, Vec3};
-use voodoo_core::{Body, Limb};
+use voodoo_core::{Body, Limb, Unexpected};
 
 use crate::arrays::{Array, array};
 use crate::body::{PyBody, at_rest};
-use crate::errors::{MeasurementError, unless};
+use crate::errors::{MeasurementError, raise, unless};
 
 pub(crate) type Given<'py> = PyReadonlyArrayDyn<'py, f64>;
 /// A table of numbers, which is read faster than tuples.
@@ -170,10 +170,8 @@ pub(crate) fn skeleton<'py>(
 
 /// The leading axes of an array that ends with the given ones.
 fn leading<'a>(array: &'a PyReadonlyArrayDyn<'_, f64>, last: &[usize]) -> PyResult<&'a [usize]> {
-    array.shape().strip_suffix(last).ok_or_else(|| {
-        let text = format!("rotations: expected shape (..., {last:?}), found {:?}", array.shape());
-        MeasurementError::new_err(text)
-    })
+    let (expected, found) = (format_args!("shape (..., {last:?})"), format_args!("{:?}", array.shape()));
+    array.shape().strip_suffix(last).ok_or_else(|| raise(Unexpected::new("rotations", expected, found)))
 }
 
 #[doc = stub!("quaternions")]
