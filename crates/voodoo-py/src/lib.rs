@@ -22,7 +22,6 @@ mod estimate;
 mod frame;
 mod ik;
 mod keypoints;
-mod layout;
 mod people;
 mod shape;
 mod sites;
@@ -47,11 +46,10 @@ mod _core {
         frame::PyFrame,
         ik::{PyChain, PyView},
         keypoints::{PyKeypointLayout, carried, linear_sum_assignment, nearest_surface},
-        layout::Layout,
         people::PyPeople,
         shape::{PyClosestPoints, PyShape},
         sites::{PySiteGate, PySiteRay, expected_sites},
-        skeleton::{euler_angles, quaternions, skeleton},
+        skeleton::{Layout, euler_angles, quaternions, skeleton},
         skin::PySkinCue,
         template::{Template, people_text},
         tracker::{PyTracker, body_before},
