@@ -47,8 +47,9 @@ impl PyPeople {
     fn person(&self, id: usize) -> PyResult<&BodyTracker> {
         let found = self.people.present().find(|(there, _)| *there == id).map(|(_, tracker)| tracker);
         found.ok_or_else(|| {
-            let there = self.present();
-            BodyError::new_err(format!("person: expected one of those who are there, {there:?}, found {id}"))
+            let there: Vec<String> = self.present().iter().map(usize::to_string).collect();
+            let there = if there.is_empty() { "nobody".to_owned() } else { there.join(", ") };
+            BodyError::new_err(format!("person: expected one of those who are there ({there}), found {id}"))
         })
     }
 }
