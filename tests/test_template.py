@@ -42,7 +42,8 @@ def test_numbers_may_be_in_messages_twice_or_not_at_all():
 def test_a_text_gets_whole_numbers_and_words():
     numbers = [np.array([1.4e-5, -2.6e-5]), np.array([[3e-6], [0.0], [1.234567]])]
     assert _core.people_text(b"a \0, \1\0e-5 \2 \2!\2", numbers, 2.5, []) == b"a 1, 2.5-3e-5 3 0!1234567"
-    assert _core.people_text(b"\1 \1 \1", [], 1.0, [_core._nobody(0.0)]) == b"1.0 searching null"
+    nobody = _core._estimate({"stamp": 0.0}, (), (), (), ())
+    assert _core.people_text(b"\1 \1 \1", [], 1.0, [nobody]) == b"1.0 searching null"
     for text, given in ((b"\0", []), (b"\1\1", []), (b"\1", numbers), (b"", [])):
         with pytest.raises(MeasurementError, match="places for all numbers and words"):
             _core.people_text(text, given, 1.0, [])

@@ -29,7 +29,6 @@ __all__ = [
     "View",
     "__version__",
     "_estimate",
-    "_nobody",
     "body_before",
     "carried",
     "config_fields",
@@ -322,8 +321,8 @@ class Layout:
 
     def rows(
         self, estimates: Sequence[Estimate], bodies: Sequence[Body], turn: npt.NDArray[np.float64] | None
-    ) -> tuple[npt.NDArray[np.float64], list[bool]]:
-        """The rows (P, ...) of persons who have a pose, turned by a rigid (4, 4); and whether their covariance is known."""
+    ) -> npt.NDArray[np.float64]:
+        """The rows (P, ...) of persons who have a pose, turned by a rigid (4, 4)."""
 
 def people_text(
     text: bytes, numbers: Sequence[npt.NDArray[np.float64]], stamp: float, estimates: Sequence[Estimate]
@@ -386,10 +385,7 @@ def _estimate(
     joints: Sequence[str | None],
     sources: Sequence[str],
 ) -> Estimate:
-    """Restores an estimate from its pickled state."""
-
-def _nobody(stamp: float) -> Estimate:
-    """The estimate of a frame in which nobody is tracked."""
+    """Restores an estimate from its pickled state; what that leaves out is as in a frame in which nobody is tracked."""
 
 def config_fields() -> list[tuple[str, str, str, Any, tuple[float, float] | None, list[str]]]:
     """Name, documentation, unit, default, (least, greatest) and words of every configuration entry."""
@@ -805,7 +801,9 @@ class Tracker:
     @property
     def estimate(self) -> Estimate: ...
     def _body(self) -> Body: ...
-    def _reset(self, joints: Mapping[str, tuple[float, float, float]], *, fit_sizes: bool = True) -> Estimate: ...
+    def _reset(
+        self, joints: Sequence[tuple[str, tuple[float, float, float]]], *, fit_sizes: bool = True
+    ) -> Estimate: ...
     def _reset_pose(self, world_from_limb: Sequence[npt.ArrayLike]) -> Estimate: ...
     def step(self, frame: Frame) -> Estimate: ...
     def _segment(
@@ -848,12 +846,12 @@ class People:
     @property
     def refusal(self) -> str | None: ...
     def step(self, frame: Frame, own: Sequence[tuple[int, Frame]]) -> list[tuple[int, Estimate]]: ...
-    def add(self, joints: Mapping[str, tuple[float, float, float]], fit_sizes: bool) -> int: ...
+    def add(self, joints: Sequence[tuple[str, tuple[float, float, float]]], fit_sizes: bool) -> int: ...
     def needs_colors(self) -> bool: ...
     def present(self) -> list[int]: ...
     def only(self, ids: Sequence[int] | None) -> None: ...
-    def estimate(self, id: int) -> Estimate | None: ...
-    def body(self, id: int) -> Body | None: ...
+    def estimate(self, id: int) -> Estimate: ...
+    def body(self, id: int) -> Body: ...
 
 @final
 class View:

@@ -197,11 +197,7 @@ class People:
         Raises:
             BodyError: there is no person with this number.
         """
-        core = self._core.body(person)
-        if core is None:
-            there = ", ".join(str(other.id) for other in self._estimate) or "nobody"
-            raise BodyError(f"person: expected one of those who are there ({there}), found {person}")
-        return Body(core, same=self._prototype)
+        return Body(self._core.body(person), same=self._prototype)
 
 
 class Followed:
@@ -230,10 +226,7 @@ class Followed:
         Raises:
             BodyError: the person is not present.
         """
-        found = self._people._core.estimate(self._number)
-        if found is None:
-            raise BodyError(f"person: expected one of those who are there, found {self._number}")
-        return found
+        return self._people._core.estimate(self._number)
 
     def predict(self, stamp: float) -> dict[str, npt.NDArray[np.float64]]:
         """See Tracker.predict."""

@@ -273,8 +273,7 @@ class Tracker:
         of_kind("parent", parent, str, BodyError)
         of_kind("shape", shape, TaperedEllipticCylinder, BodyError)
         of_kind("joint", joint, Joint, BodyError)
-        places = list(checked_joints(sites or {}, what="sites").items())
-        self._core._add_limb(name, parent, shape, joint.parts(), places)
+        self._core._add_limb(name, parent, shape, joint.parts(), checked_joints(sites or {}, what="sites"))
 
     def remove_limb(self, name: str) -> None:
         """Remove a limb and its descendants without losing the track.

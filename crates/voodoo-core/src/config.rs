@@ -1,176 +1,41 @@
 //! Every parameter of the tracker, defined once: name, type, default, range, unit and meaning.
 //!
-//! The Python package builds its validated `Config` class and the commented TOML from [`Config::fields`].
+//! The Python package builds its validated `Config` class and the commented TOML from [`Config::FIELDS`].
 
-/// A configuration entry that is unknown or outside its range.
-///
-/// ```
-/// use voodoo_core::{Config, ConfigError, Value};
-///
-/// let mut config = Config::default();
-/// config.set("solver", &Value::Word("tree".into()))?;
-/// let refused = config.set("threads", &Value::Whole(0));
-/// assert!(matches!(refused, Err(ConfigError::Value { key: "threads", .. })));
-/// assert_eq!(config.threads, 1);
-/// # Ok::<(), ConfigError>(())
-/// ```
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ConfigError {
-    /// No such key.
-    #[error("unknown configuration key {0:?}")]
-    UnknownKey(String),
-    /// An invalid value.
-    #[error("{key}: expected {expected}, found {found:?}")]
-    Value {
-        /// The key.
-        key: &'static str,
-        /// The expected value.
-        expected: String,
-        /// The value found.
-        found: Value,
-    },
-}
+use serde::{Deserialize, Serialize};
+use toml::{Table, Value};
 
-/// A value of a configuration entry.
-///
-/// [`Field`] has an example.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(untagged))]
-pub enum Value {
-    /// A real number. Without a fraction, it also sets an entry that is a whole number.
-    Real(f64),
-    /// A whole number.
-    Whole(usize),
-    /// A Boolean.
-    Switch(bool),
-    /// One of several keywords.
-    Word(String),
-}
-
-impl Value {
-    /// The number, if it is one.
-    fn number(&self) -> Option<f64> {
-        match *self {
-            Self::Real(number) => Some(number),
-            Self::Whole(number) => Some(number as f64),
-            _ => None,
-        }
-    }
-}
+use crate::error::Unexpected;
 
 /// Description of a configuration entry.
 ///
 /// ```
-/// use voodoo_core::{Config, Value};
+/// use voodoo_core::Config;
 ///
-/// for field in Config::default().fields() {
-///     let text = match field.default {
-///         Value::Real(number) => format!("{number} {}", field.unit),
-///         Value::Whole(number) => number.to_string(),
-///         Value::Switch(switch) => switch.to_string(),
-///         Value::Word(word) => format!("{word}, of {:?}", field.words),
-///     };
-///     println!("{}: {text}", field.name);
+/// for field in Config::FIELDS {
+///     println!("{} [{}]: {} {:?} {:?}", field.name, field.unit, field.doc, field.range, field.words);
 /// }
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Field {
     /// Its key.
     pub name: &'static str,
     /// Its meaning, in one or a few sentences.
-    pub doc: String,
+    pub doc: &'static str,
     /// Its unit; empty when it has none.
     pub unit: &'static str,
-    /// Its default.
-    pub default: Value,
     /// Minimum and maximum of a number.
     pub range: Option<(f64, f64)>,
     /// The allowed keywords.
     pub words: &'static [&'static str],
 }
 
-/// A type that a configuration entry can have.
-trait Entry: Sized {
-    /// Description of the type, to which the range and the keywords are added.
-    const EXPECTED: &'static str;
-    const WORDS: &'static [&'static str] = &[];
-    fn value(&self) -> Value;
-    fn parse(value: &Value) -> Option<Self>;
-}
-
-/// A value from outside as an entry, checked for type and range.
-fn parsed<T: Entry>(key: &'static str, value: &Value, range: Option<(f64, f64)>) -> Result<T, ConfigError> {
-    let within = value.number().zip(range).is_none_or(|(number, (low, high))| (low..=high).contains(&number));
-    T::parse(value).filter(|_| within).ok_or_else(|| {
-        let expected = match range {
-            Some((low, high)) => format!("{} from {low} to {high}", T::EXPECTED),
-            None => format!("{}{}", T::EXPECTED, T::WORDS.join(", ")),
-        };
-        ConfigError::Value { key, expected, found: value.clone() }
-    })
-}
-
-impl Entry for f64 {
-    const EXPECTED: &'static str = "a number";
-    fn value(&self) -> Value {
-        Value::Real(*self)
-    }
-    fn parse(value: &Value) -> Option<Self> {
-        value.number().filter(|number| number.is_finite())
-    }
-}
-
-impl Entry for usize {
-    const EXPECTED: &'static str = "a whole number";
-    fn value(&self) -> Value {
-        Value::Whole(*self)
-    }
-    fn parse(value: &Value) -> Option<Self> {
-        let is_whole = |number: &f64| *number >= 0.0 && number.fract() == 0.0 && *number < 1e9;
-        value.number().filter(is_whole).map(|number| number as usize)
-    }
-}
-
-impl Entry for bool {
-    const EXPECTED: &'static str = "true or false";
-    fn value(&self) -> Value {
-        Value::Switch(*self)
-    }
-    fn parse(value: &Value) -> Option<Self> {
-        match value {
-            Value::Switch(switch) => Some(*switch),
-            _ => None,
-        }
-    }
-}
-
-macro_rules! words {
-    ($(#[$meta:meta])* $name:ident { $($(#[doc = $doc:literal])* $variant:ident = $word:literal),+ $(,)? }) => {
-        $(#[$meta])*
-        ///
-        /// [`Config`] has an example.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[non_exhaustive]
-        pub enum $name { $($(#[doc = $doc])* $variant),+ }
-        impl Entry for $name {
-            const EXPECTED: &'static str = "one of ";
-            const WORDS: &'static [&'static str] = &[$($word),+];
-            fn value(&self) -> Value {
-                Value::Word(match self { $(Self::$variant => $word),+ }.to_owned())
-            }
-            fn parse(value: &Value) -> Option<Self> {
-                match value {
-                    $(Value::Word(word) if word == $word => Some(Self::$variant),)+
-                    _ => None,
-                }
-            }
-        }
-    };
-}
-
 macro_rules! config {
-    ($($(#[doc = $doc:literal])+ $name:ident: $kind:ty = $default:expr, $unit:literal $(, $low:literal ..= $high:literal)?;)+) => {
+    ($(
+        $(#[doc = $doc:literal])+
+        $name:ident: $kind:ty = $default:expr, $unit:literal
+        $(, $low:literal ..= $high:literal)? $(, [$($word:literal),+])?;
+    )+) => {
         /// The parameters of the tracker. Defaults are the measured ones.
         ///
         /// ```
@@ -183,7 +48,7 @@ macro_rules! config {
         /// assert_eq!(tracker.config().solver, SolverKind::Limbwise);
         /// # Ok::<(), Box<dyn std::error::Error>>(())
         /// ```
-        #[derive(Clone, Debug, PartialEq)]
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[non_exhaustive]
         pub struct Config { $($(#[doc = $doc])+ pub $name: $kind),+ }
 
@@ -194,61 +59,88 @@ macro_rules! config {
         }
 
         impl Config {
-            /// All entries in the order of their definition, with the values of `self` as defaults.
-            pub fn fields(&self) -> Vec<Field> {
-                vec![$(Field {
-                    name: stringify!($name),
-                    doc: [$($doc),+].concat().trim().to_owned(),
-                    unit: $unit,
-                    default: self.$name.value(),
-                    range: config!(@range $($low $high)?),
-                    words: <$kind as Entry>::WORDS,
-                }),+]
-            }
-
-            /// Sets one entry, checked for type and range.
-            pub fn set(&mut self, key: &str, value: &Value) -> Result<(), ConfigError> {
-                match key {
-                    $(stringify!($name) => {
-                        self.$name = parsed(stringify!($name), value, config!(@range $($low $high)?))?;
-                    })+
-                    _ => return Err(ConfigError::UnknownKey(key.to_owned())),
-                }
-                Ok(())
-            }
+            /// All entries in the order of their definition.
+            pub const FIELDS: &'static [Field] = &[$(Field {
+                name: stringify!($name),
+                doc: concat!($($doc),+).trim_ascii(),
+                unit: $unit,
+                range: config!(@range $($low $high)?),
+                words: &[$($($word),+)?],
+            }),+];
         }
     };
     (@range $low:literal $high:literal) => { Some(($low as f64, $high as f64)) };
     (@range) => { None };
 }
 
-words! {
-    /// Assignment of a free point inside the boxes of several limbs (K06 IV-B.2).
-    Overlap {
-        /// To all of them.
-        Shared = "shared",
-        /// To the closest one (K07 3.2).
-        Exclusive = "exclusive",
-        /// To the closest one, and to those of the others that are joined to it.
-        Adjacent = "adjacent",
+impl Config {
+    /// Sets one entry, checked for type and range.
+    ///
+    /// ```
+    /// use voodoo_core::Config;
+    ///
+    /// let mut config = Config::default();
+    /// config.set("solver", "tree")?;
+    /// let refused = config.set("threads", 0).unwrap_err();
+    /// assert_eq!(refused.to_string(), "threads: expected a number from 1 to 256, found Integer(0)");
+    /// assert_eq!(config.threads, 1);
+    /// # Ok::<(), voodoo_core::Unexpected>(())
+    /// ```
+    pub fn set(&mut self, key: &str, value: impl Into<Value>) -> Result<(), Unexpected> {
+        let value = value.into();
+        let unknown = || Unexpected::new("key", "one of the configuration", format_args!("{key:?}"));
+        let field = Self::FIELDS.iter().find(|field| field.name == key).ok_or_else(unknown)?;
+        let number = value.as_float().or_else(|| value.as_integer().map(|number| number as f64));
+        let within = number.zip(field.range).is_none_or(|(number, (low, high))| (low..=high).contains(&number));
+        let mut entries =
+            Table::try_from(&*self).map_err(|error| Unexpected::new("configuration", "entries", error))?;
+        entries.insert(key.to_owned(), value.clone());
+        let changed = entries.try_into().ok().filter(|_| within);
+        *self = changed.ok_or_else(|| {
+            let expected = match field.range {
+                Some((low, high)) => format!("a number from {low} to {high}"),
+                None if field.words.is_empty() => "true or false".to_owned(),
+                None => format!("one of {}", field.words.join(", ")),
+            };
+            Unexpected::new(key, expected, format_args!("{value:?}"))
+        })?;
+        Ok(())
     }
 }
 
-words! {
-    /// Solver of the pose for given correspondences.
-    SolverKind {
-        /// Each limb alone, by weighted absolute orientation (K06, K07).
-        Limbwise = "limbwise",
-        /// All limbs at once with exact joints, by damped Gauss-Newton with robust terms (R07, method section 4.3).
-        Chain = "chain",
-        /// All limbs at once, each with a separate twist, joined by stiff elastic bands (K07 section 4).
-        Tree = "tree",
-    }
+/// Assignment of a free point inside the boxes of several limbs (K06 IV-B.2).
+///
+/// [`Config`] has an example.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum Overlap {
+    /// To all of them.
+    Shared,
+    /// To the closest one (K07 3.2).
+    Exclusive,
+    /// To the closest one, and to those of the others that are joined to it.
+    Adjacent,
+}
+
+/// Solver of the pose for given correspondences.
+///
+/// [`Config`] has an example.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum SolverKind {
+    /// Each limb alone, by weighted absolute orientation (K06, K07).
+    Limbwise,
+    /// All limbs at once with exact joints, by damped Gauss-Newton with robust terms (R07, method section 4.3).
+    Chain,
+    /// All limbs at once, each with a separate twist, joined by stiff elastic bands (K07 section 4).
+    Tree,
 }
 
 config! {
     /// Solver of the pose for given correspondences.
-    solver: SolverKind = SolverKind::Chain, "";
+    solver: SolverKind = SolverKind::Chain, "", ["limbwise", "chain", "tree"];
     /// Maximum number of ICP steps per frame (K07 section 7 recommends 6 of the published ones).
     max_steps: usize = 5, "", 1 ..= 100;
     /// Convergence threshold: the steps end when the mean squared distance changes by less (K06 III-B step 6;
@@ -259,7 +151,7 @@ config! {
     /// Enlargement of the box of each limb: the largest motion of a limb between two frames (K06 IV-B.2; limbwise solver).
     limb_box_margin: f64 = 0.10, "m", 0.0 ..= 10.0;
     /// Assignment of a free point inside the boxes of several limbs (K06 IV-B.2).
-    overlap: Overlap = Overlap::Exclusive, "";
+    overlap: Overlap = Overlap::Exclusive, "", ["shared", "exclusive", "adjacent"];
     /// Approximate maximum number of pixels of a depth image; larger images are sampled on a grid.
     max_points: usize = 3000, "", 100 ..= 10000000;
     /// Learn the static background from the depth images of cameras that do not move, and exclude it.

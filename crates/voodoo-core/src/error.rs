@@ -1,8 +1,39 @@
-//! The errors of bodies and of tracking: each states what was expected and what was found.
+//! The errors of bodies and of tracking, which state what was expected and what was found.
 
 use std::fmt::Display;
 
 use crate::shape::ShapeError;
+
+/// What is not as expected: an entry of a body, a number of a camera, a parameter, or a measurement.
+///
+/// ```
+/// use voodoo_core::Camera;
+///
+/// let error = Camera::pinhole(640, 480, [-525.0, 525.0, 319.5, 239.5]).unwrap_err();
+/// assert_eq!(error.to_string(), "camera fx, fy: expected finite focal lengths above zero, found -525, 525");
+/// ```
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{what}: expected {expected}, found {found}")]
+pub struct Unexpected {
+    /// Name of the entry or the argument.
+    pub what: String,
+    /// What was expected.
+    pub expected: String,
+    /// What was found.
+    pub found: String,
+}
+
+impl Unexpected {
+    /// The name of an entry or argument, what was expected and what was found.
+    pub fn new(what: impl Display, expected: impl Display, found: impl Display) -> Self {
+        Self { what: what.to_string(), expected: expected.to_string(), found: found.to_string() }
+    }
+
+    /// Rejects what is not valid; the texts are made only then.
+    pub fn unless(valid: bool, what: impl Display, expected: impl Display, found: impl Display) -> Result<(), Self> {
+        if valid { Ok(()) } else { Err(Self::new(what, expected, found)) }
+    }
+}
 
 /// A body description that cannot be tracked. `key` is the path of the offending entry.
 ///
@@ -21,17 +52,6 @@ use crate::shape::ShapeError;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BodyError {
-    /// The body has no limb.
-    #[error("body: expected at least one limb, found none")]
-    Empty,
-    /// Two limbs or two sites share a name.
-    #[error("{key}: the name {name:?} is already taken")]
-    Duplicate {
-        /// Key of the second one.
-        key: String,
-        /// The name.
-        name: String,
-    },
     /// A name that is not in the body.
     #[error("{what}: unknown {what} {name:?}; known are: {}", known.join(", "))]
     Unknown {
@@ -43,15 +63,8 @@ pub enum BodyError {
         known: Vec<String>,
     },
     /// A value outside its domain, or a human name that contradicts the others.
-    #[error("{key}: expected {expected}, found {found}")]
-    Value {
-        /// Key of the entry.
-        key: String,
-        /// The expected value.
-        expected: &'static str,
-        /// The value found.
-        found: String,
-    },
+    #[error(transparent)]
+    Value(#[from] Unexpected),
     /// A shape that is not a valid solid.
     #[error("{key}: {source}")]
     Shape {
@@ -60,55 +73,6 @@ pub enum BodyError {
         /// The error of the shape.
         source: ShapeError,
     },
-}
-
-impl BodyError {
-    /// A value outside its domain: the key of the entry, the expected value and the value found.
-    pub fn value(key: impl Into<String>, expected: &'static str, found: impl Into<String>) -> Self {
-        Self::Value { key: key.into(), expected, found: found.into() }
-    }
-
-    /// Rejects a value that is not valid; the texts are made only then.
-    pub(crate) fn unless(
-        valid: bool,
-        key: impl Display,
-        expected: &'static str,
-        found: impl Display,
-    ) -> Result<(), Self> {
-        if valid { Ok(()) } else { Err(Self::value(key.to_string(), expected, found.to_string())) }
-    }
-}
-
-/// An invalid camera calibration.
-///
-/// ```
-/// use voodoo_core::Camera;
-///
-/// let error = Camera::pinhole(640, 480, [-525.0, 525.0, 319.5, 239.5]).unwrap_err();
-/// assert_eq!(error.to_string(), "camera fx, fy: expected finite focal lengths above zero, found -525, 525");
-/// ```
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-#[error("camera {what}: expected {expected}, found {found}")]
-pub struct CameraError {
-    /// Name of the invalid number.
-    pub what: &'static str,
-    /// The expected value.
-    pub expected: &'static str,
-    /// The value found.
-    pub found: String,
-}
-
-impl CameraError {
-    /// Rejects a number that is not valid; the text is made only then.
-    pub(crate) fn unless(
-        valid: bool,
-        what: &'static str,
-        expected: &'static str,
-        found: impl Display,
-    ) -> Result<(), Self> {
-        if valid { Ok(()) } else { Err(Self { what, expected, found: found.to_string() }) }
-    }
 }
 
 /// Why the tracker rejected a call. The tracker is unchanged afterwards.
@@ -141,39 +105,9 @@ pub enum TrackError {
         found: f64,
     },
     /// A measurement with a value that cannot be used.
-    #[error("{what}: expected {expected}, found {found}")]
-    Measurement {
-        /// Name of the argument.
-        what: String,
-        /// The expected value.
-        expected: &'static str,
-        /// The value found.
-        found: String,
-    },
-    /// The given joint positions do not determine the pose.
-    #[error("joints: expected at least three positions that do not lie on a line, found {found} position(s)")]
-    Underdetermined {
-        /// Number of given positions.
-        found: usize,
-    },
+    #[error(transparent)]
+    Measurement(#[from] Unexpected),
     /// A problem with the body.
     #[error(transparent)]
     Body(#[from] BodyError),
-}
-
-impl TrackError {
-    /// An invalid measurement: the argument, the expected value and the value found.
-    pub fn measurement(what: impl Into<String>, expected: &'static str, found: impl Into<String>) -> Self {
-        Self::Measurement { what: what.into(), expected, found: found.into() }
-    }
-
-    /// Rejects a measurement that is not valid; the texts are made only then.
-    pub(crate) fn unless(
-        valid: bool,
-        what: impl Display,
-        expected: &'static str,
-        found: impl Display,
-    ) -> Result<(), Self> {
-        if valid { Ok(()) } else { Err(Self::measurement(what.to_string(), expected, found.to_string())) }
-    }
 }

@@ -187,9 +187,9 @@ pub mod kinematics {
 
 pub use body::{Body, HumanModel, Joint, JointKind, Limb, LimbRole, Roles, Side, Site};
 pub use camera::{Camera, Lens};
-pub use config::{Config, ConfigError, Field, Overlap, SolverKind, Value};
+pub use config::{Config, Field, Overlap, SolverKind};
 pub use detect::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
-pub use error::{BodyError, CameraError, TrackError};
+pub use error::{BodyError, TrackError, Unexpected};
 pub use observation::frame::{
     Cloud, DepthImage, DepthPixels, DetectedPerson, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope,
 };
@@ -198,6 +198,7 @@ pub use people::one::Tracker;
 pub use people::{People, PeopleOptions, Refusal};
 pub use regions::RegionLine;
 pub use shape::{Region, ShapeError, SurfaceBatch, SurfacePoint, TaperedEllipticCylinder};
+pub use toml::Value;
 pub use tracker::BodyTracker;
 pub use tracker::estimate::{Estimate, LimbStatus, SourceReport, Status};
 pub use tracker::expected::LimbMotion;

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use crate::config::Config;
-use crate::error::TrackError;
+use crate::error::Unexpected;
 
 /// Threads that share the work of a step.
 #[derive(Debug, Default)]
@@ -19,10 +19,9 @@ pub(crate) struct Threads {
 
 impl Threads {
     /// Starts the threads of a configuration.
-    pub(crate) fn new(config: &Config) -> Result<Self, TrackError> {
-        let pool = started(config.threads).map_err(|error| {
-            TrackError::measurement("threads", "a number of threads the system can start", error.to_string())
-        })?;
+    pub(crate) fn new(config: &Config) -> Result<Self, Unexpected> {
+        let refused = |error| Unexpected::new("threads", "a number of threads the system can start", error);
+        let pool = started(config.threads).map_err(refused)?;
         Ok(Self { pool, process: process::id() })
     }
 

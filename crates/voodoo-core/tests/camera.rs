@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use crate::scene::Noise;
-use voodoo_core::CameraError;
+use voodoo_core::Unexpected;
 use voodoo_core::math::Vec3;
 use voodoo_core::{Camera, Lens};
 
@@ -155,8 +155,8 @@ fn a_window_holds_all_that_is_visible_of_a_box() {
 fn impossible_cameras_are_refused_with_what_is_wrong() {
     let good = [10.0, 12.0, 3.5, 2.5];
     let of = |width, height, intrinsics, lens| Camera::new(width, height, intrinsics, lens).unwrap_err();
-    let about = |error: CameraError, what: &str, words: &str| {
-        assert_eq!(error.what, what);
+    let about = |error: Unexpected, what: &str, words: &str| {
+        assert_eq!(error.what, format!("camera {what}"));
         assert!(error.to_string().contains(words), "{error}");
     };
     about(of(0, 6, good, Lens::Pinhole), "size", "1 to 33554432 pixels, found 0x6");

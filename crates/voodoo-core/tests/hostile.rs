@@ -149,16 +149,15 @@ fn bodies(from: &mut Hostile) {
 /// Configurations: an entry is refused or stays as it was said.
 fn configurations(from: &mut Hostile) {
     let mut config = Config::default();
-    let fields = config.fields();
-    let field = &fields[from.below(fields.len())];
+    let field = &Config::FIELDS[from.below(Config::FIELDS.len())];
     let value = match from.below(4) {
-        0 => Value::Real(from.number(10.0)),
-        1 => Value::Switch(true),
-        2 => Value::Word("chain".into()),
-        _ => Value::Real(ODD[from.below(ODD.len())]),
+        0 => Value::Float(from.number(10.0)),
+        1 => Value::Boolean(true),
+        2 => Value::String("chain".into()),
+        _ => Value::Float(ODD[from.below(ODD.len())]),
     };
     let before = config.clone();
-    if config.set(field.name, &value).is_err() {
+    if config.set(field.name, value.clone()).is_err() {
         assert_eq!(config, before, "{} {value:?}", field.name);
     }
 }

@@ -5,7 +5,7 @@ use crate::detection::Fixed;
 use crate::scene;
 use voodoo_core::Value;
 use voodoo_core::math::{Pose, Quat, Vec3};
-use voodoo_core::{Body, BodyError, Config, ConfigError, Status, TaperedEllipticCylinder, TrackError, Tracker};
+use voodoo_core::{Body, Config, Status, TaperedEllipticCylinder, TrackError, Tracker};
 use voodoo_core::{Camera, DetectedPerson};
 use voodoo_core::{Cloud, DepthImage, DepthPixels, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope};
 use voodoo_core::{HumanModel, Joint, JointKind, Limb, Site};
@@ -151,9 +151,10 @@ fn a_refused_reset_changes_nothing() {
     tracker.step(&scene::with_cloud(1.0, &[scene::cloud(&points)])).unwrap();
     let before = scene::bits(tracker.estimate());
     let body = tracker.body().clone();
-    assert!(matches!(tracker.reset(&[(0, Vec3::ZERO)], true), Err(TrackError::Underdetermined { .. })));
+    let underdetermined = |error: TrackError| error.to_string().contains("three positions that do not lie on a line");
+    assert!(underdetermined(tracker.reset(&[(0, Vec3::ZERO)], true).unwrap_err()));
     let line = [0, 1, 2].map(|index| (index, Vec3::Z * index as f64));
-    assert!(matches!(tracker.reset(&line, true), Err(TrackError::Underdetermined { .. })));
+    assert!(underdetermined(tracker.reset(&line, true).unwrap_err()));
     assert!(tracker.reset(&[(99, Vec3::ZERO)], true).unwrap_err().to_string().contains("99"));
     assert!(tracker.reset(&[(0, Vec3::NAN); 3], true).unwrap_err().to_string().contains("humanoid_root"));
     let millimeters: Vec<_> = sites_of(&tracker).into_iter().map(|(site, place)| (site, place * 1000.0)).collect();
@@ -203,7 +204,10 @@ fn bad_bodies_are_refused_by_key() {
     };
     let site = |name: &str, limb, position| Site { name: name.into(), limb, position };
     assert!(Body::new("thing", with_joint(|_| {}), vec![site("s", 1, Vec3::ZERO)]).is_ok());
-    assert_eq!(Body::new("thing", vec![], vec![]).unwrap_err(), BodyError::Empty);
+    assert_eq!(
+        Body::new("thing", vec![], vec![]).unwrap_err().to_string(),
+        "body: expected at least one limb, found none"
+    );
     let many = vec![Body::human(1.75, HumanModel::Papers).unwrap().limbs()[0].clone(); 1_001];
     let error = Body::new("thing", many, vec![]).unwrap_err().to_string();
     assert_eq!(error, "body: expected at most 1,000 limbs and 10,000 sites, found 1001 and 0");
@@ -252,27 +256,30 @@ fn joints_have_the_bands_of_their_kind() {
 
 #[test]
 fn configuration_entries_keep_their_ranges() {
-    for field in Config::default().fields() {
+    let defaults = toml::Table::try_from(Config::default()).unwrap();
+    for field in Config::FIELDS {
+        let default = &defaults[field.name];
+        let number = |number: f64| match default {
+            Value::Integer(_) if number.is_finite() => Value::Integer(number as i64),
+            _ => Value::Float(number),
+        };
         let mut config = Config::default();
-        let mut set = |value: Value| config.set(field.name, &value);
+        let mut set = |value: Value| config.set(field.name, value);
+        assert!(set(default.clone()).is_ok());
         if let Some((low, high)) = field.range {
-            assert!(set(Value::Real(low)).is_ok() && set(Value::Real(high)).is_ok(), "{}", field.name);
+            assert!(set(number(low)).is_ok() && set(number(high)).is_ok(), "{}", field.name);
             for bad in [low - 1.0, high + 1.0, f64::NAN, f64::INFINITY] {
-                let error = set(Value::Real(bad)).unwrap_err();
-                assert!(matches!(&error, ConfigError::Value { key, .. } if *key == field.name), "{error}");
+                assert_eq!(set(number(bad)).unwrap_err().what, field.name);
             }
         }
-        match field.default {
-            Value::Whole(_) => assert!(set(Value::Real(1.5)).is_err()),
-            Value::Word(word) => {
-                assert!(set(Value::Word("surely not".into())).is_err());
-                assert!(set(Value::Word(word)).is_ok());
-            }
-            Value::Switch(_) => assert!(set(Value::Real(1.0)).is_err()),
-            Value::Real(_) => assert!(set(Value::Word("1".into())).is_err()),
+        match default {
+            Value::Integer(_) => assert!(set(1.5.into()).is_err()),
+            Value::String(_) => assert!(set("surely not".into()).is_err()),
+            Value::Boolean(_) => assert!(set(1.0.into()).is_err()),
+            _ => assert!(set("1".into()).is_err()),
         }
         assert!(!field.doc.is_empty());
     }
-    let unknown = Config::default().set("color", &Value::Switch(true)).unwrap_err();
-    assert_eq!(unknown, ConfigError::UnknownKey("color".into()));
+    let unknown = Config::default().set("color", true).unwrap_err();
+    assert_eq!(unknown.to_string(), "key: expected one of the configuration, found \"color\"");
 }

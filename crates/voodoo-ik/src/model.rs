@@ -2,7 +2,7 @@
 
 use voodoo_core::kinematics::hinge_axis;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
-use voodoo_core::{Body, BodyError, JointKind, Limb};
+use voodoo_core::{Body, BodyError, JointKind, Limb, Unexpected};
 
 /// How a link moves relative to its parent.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,7 +77,7 @@ impl ChainModel {
         let mut model = Self::default();
         for limb in chosen {
             let Some(description) = body.limbs().get(limb) else {
-                return Err(BodyError::value("limbs", "indices of limbs", limb.to_string()));
+                return Err(Unexpected::new("limbs", "indices of limbs", limb).into());
             };
             model.add(limb, description, free_root)?;
         }
@@ -87,10 +87,9 @@ impl ChainModel {
     fn add(&mut self, limb: usize, description: &Limb, free_root: bool) -> Result<(), BodyError> {
         let (start, joint) = (self.names.len(), &description.parent);
         let parent = joint.as_ref().and_then(|(index, _)| self.links.iter().position(|link| link.limb == *index));
-        if parent.is_none() && !self.links.is_empty() {
-            let found = format!("{} without its parent", description.name);
-            return Err(BodyError::value("limbs", "limbs that hang together, parents included", found));
-        }
+        let (valid, expected) =
+            (parent.is_some() || self.links.is_empty(), "limbs that hang together, parents included");
+        Unexpected::unless(valid, "limbs", expected, format_args!("{} without its parent", description.name))?;
         let free = [f64::NEG_INFINITY, f64::INFINITY];
         let first = self.links.is_empty();
         let (mut parent_from_joint, mut joint_from_limb) = (Pose::IDENTITY, Pose::IDENTITY);

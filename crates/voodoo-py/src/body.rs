@@ -1,11 +1,12 @@
 //! `Body`: created by `voodoo.model.body` from validated parts.
 
 use pyo3::prelude::*;
+use pythonize::depythonize;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
-use voodoo_core::{Body, HumanModel, Joint, Limb, Site};
+use voodoo_core::{Body, Joint, Limb, Site};
 
 use crate::arrays::{Array, frozen};
-use crate::errors::{BodyError, raise};
+use crate::errors::{BodyError, raise, wrong};
 use crate::shape::PyShape;
 
 /// A rotation as Python represents it.
@@ -112,13 +113,10 @@ impl PyBody {
     }
 
     #[staticmethod]
-    fn human(stature: f64, model: &str) -> PyResult<Self> {
-        let known = [("measured", HumanModel::Measured), ("full", HumanModel::Full), ("papers", HumanModel::Papers)];
-        let found = known.iter().find(|(name, _)| *name == model).ok_or_else(|| {
-            let text = format!("model: expected \"measured\", \"full\" or \"papers\", found {model:?}");
-            BodyError::new_err(text)
-        })?;
-        Body::human(stature, found.1).map(Self).map_err(raise)
+    fn human(stature: f64, model: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let expected = "\"measured\", \"full\" or \"papers\"";
+        let model = depythonize(model).map_err(|_| BodyError::new_err(wrong("model", expected, model)))?;
+        Body::human(stature, model).map(Self).map_err(raise)
     }
 
     fn scaled(&self, factor: f64) -> PyResult<Self> {

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use voodoo_core::math::{Affine3, Vec3};
-use voodoo_core::{Camera, Lens, Rendering, Viewpoint};
+use voodoo_core::{Camera, Lens, Rendering, Unexpected, Viewpoint};
 
 use crate::arrays::{Array, array, limb_poses, pose, rows};
 use crate::body::PyBody;
-use crate::errors::{CameraError, MeasurementError, raise, wrong_argument};
+use crate::errors::{CameraError, raise, wrong_argument};
 
 type Arguments = (usize, usize, [f64; 4], String, Vec<f64>);
 
@@ -62,8 +62,7 @@ pub(crate) fn camera_of(camera: &Bound<'_, PyAny>) -> PyResult<Arc<Camera>> {
     let core = camera.getattr("core").ok().and_then(|core| core.cast_into::<PyCamera>().ok());
     core.map(|core| Arc::clone(&core.get().0)).ok_or_else(|| {
         let found = camera.get_type().name().map_or_else(|_| "something else".into(), |name| name.to_string());
-        let text = format!("camera: expected a Camera, the calibration of the image, found {found}");
-        MeasurementError::new_err(text)
+        raise(Unexpected::new("camera", "a Camera, the calibration of the image", found))
     })
 }
 

@@ -70,15 +70,6 @@ pub(crate) fn _estimate(
     Ok(PyEstimate { estimate, names: Arc::new(Names { limbs, sites, joints }), sources })
 }
 
-#[doc = stub!("_nobody")]
-#[pyfunction]
-pub(crate) fn _nobody(py: Python<'_>, stamp: f64) -> PyEstimate {
-    let mut estimate = Estimate::default();
-    estimate.stamp = stamp;
-    let [limbs, sites, joints] = [(); 3].map(|()| PyTuple::empty(py).unbind());
-    PyEstimate { estimate, names: Arc::new(Names { limbs, sites, joints }), sources: Vec::new() }
-}
-
 #[pymethods]
 impl PyEstimate {
     #[doc = stub!("Estimate.stamp")]

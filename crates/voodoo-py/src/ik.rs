@@ -1,18 +1,21 @@
-//! `Chain` of inverse kinematics; `voodoo.ik` validates and names inputs and outputs.
+//! `Chain` of inverse kinematics, and `View`, one silhouette with its camera; `voodoo.ik` validates and names what they take and
+//! return.
+
+use std::sync::Arc;
 
 use numpy::{PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
-use voodoo_core::Body;
 use voodoo_core::math::Vec3;
+use voodoo_core::{Body, Camera};
 use voodoo_ik::{
     self, Aim, Bone, ChainModel, Criterion, Goal, IkProblem, IkSolver, Kinematics, SilhouetteView, SolverOptions, Trunk,
 };
 
 use crate::arrays::{Array, frozen, limb_poses, matrices, pose};
 use crate::body::PyBody;
+use crate::camera::camera_of;
 use crate::errors::{BodyError, raise, unless};
-use crate::ik_view::PyView;
 
 /// Angles `(N, n)`; sites `(N, S, 3)`; h, steps, postures tried, those compared with images, and converged as 0 or 1, `(5, N)`; and of
 /// the last posture, poses `(P, 4, 4)` and the residual of every goal.
@@ -237,5 +240,33 @@ impl PyChain {
             matrices(py, &at.poses)?,
             PyTuple::new(py, residuals)?,
         ))
+    }
+}
+
+#[doc = stub!("View")]
+#[pyclass(name = "View", module = "voodoo._core", frozen)]
+pub struct PyView(pub SilhouetteView);
+
+#[pymethods]
+impl PyView {
+    #[new]
+    fn new(
+        distance: PyReadonlyArray2<'_, f32>,
+        thickness: PyReadonlyArray2<'_, f32>,
+        depth: Option<PyReadonlyArray2<'_, f32>>,
+        border: f64,
+        #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
+        camera_from_world: &Bound<'_, PyAny>,
+    ) -> PyResult<Self> {
+        let [height, width] = [distance.shape()[0], distance.shape()[1]];
+        let size = format_args!("{width} x {height}");
+        unless(width >= 2 && height >= 2, "silhouette", "at least 2 x 2 pixels", size)?;
+        Ok(Self(SilhouetteView {
+            pixels: distance.as_slice()?.iter().zip(thickness.as_slice()?).map(|(d, t)| [*d, *t]).collect(),
+            depth: depth.map_or(Ok(Vec::new()), |depth| depth.as_slice().map(<[f32]>::to_vec))?,
+            border,
+            camera: Camera::clone(&camera),
+            camera_from_world: pose("camera_from_world", Some(camera_from_world))?,
+        }))
     }
 }

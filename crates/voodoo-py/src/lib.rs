@@ -21,9 +21,7 @@ mod errors;
 mod estimate;
 mod frame;
 mod ik;
-mod ik_view;
 mod keypoints;
-mod layout;
 mod people;
 mod shape;
 mod sites;
@@ -44,16 +42,14 @@ mod _core {
         body::PyBody,
         camera::{PyCamera, render_depth},
         config::config_fields,
-        estimate::{_estimate, _nobody, PyEstimate},
+        estimate::{_estimate, PyEstimate},
         frame::PyFrame,
-        ik::PyChain,
-        ik_view::PyView,
+        ik::{PyChain, PyView},
         keypoints::{PyKeypointLayout, carried, linear_sum_assignment, nearest_surface},
-        layout::Layout,
         people::PyPeople,
         shape::{PyClosestPoints, PyShape},
         sites::{PySiteGate, PySiteRay, expected_sites},
-        skeleton::{euler_angles, quaternions, skeleton},
+        skeleton::{Layout, euler_angles, quaternions, skeleton},
         skin::PySkinCue,
         template::{Template, people_text},
         tracker::{PyTracker, body_before},

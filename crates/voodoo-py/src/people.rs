@@ -14,7 +14,7 @@ use crate::detector::{detector, warn_of_detector};
 use crate::errors::{BodyError, raise};
 use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
-use crate::tracker::{PyTracker, site_positions};
+use crate::tracker::{PyTracker, SitePositions, site_positions};
 
 #[doc = stub!("People")]
 #[pyclass(name = "People", module = "voodoo._core")]
@@ -37,18 +37,20 @@ impl TrackedBody<'_> {
     pub(crate) fn tracker(&self) -> PyResult<&BodyTracker> {
         match self {
             Self::Alone(tracker) => Ok(&tracker.tracker),
-            Self::Person(people, id) => {
-                let missing = || format!("person: expected one of those who are there, found {id}");
-                people.person(*id).ok_or_else(|| BodyError::new_err(missing()))
-            }
+            Self::Person(people, id) => people.person(*id),
         }
     }
 }
 
 impl PyPeople {
     /// The tracker of a present person.
-    fn person(&self, id: usize) -> Option<&BodyTracker> {
-        self.people.present().find(|(there, _)| *there == id).map(|(_, tracker)| tracker)
+    fn person(&self, id: usize) -> PyResult<&BodyTracker> {
+        let found = self.people.present().find(|(there, _)| *there == id).map(|(_, tracker)| tracker);
+        found.ok_or_else(|| {
+            let there: Vec<String> = self.present().iter().map(usize::to_string).collect();
+            let there = if there.is_empty() { "nobody".to_owned() } else { there.join(", ") };
+            BodyError::new_err(format!("person: expected one of those who are there ({there}), found {id}"))
+        })
     }
 }
 
@@ -114,8 +116,8 @@ impl PyPeople {
     }
 
     /// Adds a person at these positions; returns their id.
-    fn add(&mut self, joints: &Bound<'_, PyDict>, fit_sizes: bool) -> PyResult<usize> {
-        let positions = site_positions(self.people.prototype(), joints)?;
+    fn add(&mut self, joints: SitePositions, fit_sizes: bool) -> PyResult<usize> {
+        let positions = site_positions(self.people.prototype(), &joints)?;
         self.people.add(&positions, fit_sizes).map_err(raise)
     }
 
@@ -141,13 +143,13 @@ impl PyPeople {
     }
 
     /// The last estimate of a present person.
-    fn estimate(&self, id: usize) -> Option<PyEstimate> {
+    fn estimate(&self, id: usize) -> PyResult<PyEstimate> {
         let estimate = self.person(id)?.estimate().clone();
-        Some(PyEstimate { estimate, names: self.names.clone(), sources: Vec::new() })
+        Ok(PyEstimate { estimate, names: self.names.clone(), sources: Vec::new() })
     }
 
     /// The body of a present person, in their sizes.
-    fn body(&self, id: usize) -> Option<PyBody> {
-        self.person(id).map(|tracker| PyBody(tracker.body().clone()))
+    fn body(&self, id: usize) -> PyResult<PyBody> {
+        Ok(PyBody(self.person(id)?.body().clone()))
     }
 }

@@ -1,24 +1,23 @@
-//! Rotations and poses of many frames, or of persons of one instant, as files and live outputs need them.
+//! Rotations and poses of many frames, or of persons of one instant, as files and live outputs need them, and everything that
+//! these tell of a person as one row of numbers.
 
 use numpy::{PyReadonlyArray2, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use std::f64::consts::PI;
 use voodoo_core::math::{self, Mat3, Vec3};
-use voodoo_core::{Body, Limb};
+use voodoo_core::{Body, Limb, Unexpected};
 
 use crate::arrays::{Array, array};
 use crate::body::{PyBody, at_rest};
-use crate::errors::{MeasurementError, unless};
+use crate::errors::{MeasurementError, raise, unless};
+use crate::estimate::PyEstimate;
 
-pub(crate) type Given<'py> = PyReadonlyArrayDyn<'py, f64>;
+type Given<'py> = PyReadonlyArrayDyn<'py, f64>;
 /// A table of numbers, which is read faster than tuples.
-pub(crate) type Plan<'py> = PyReadonlyArray2<'py, i64>;
+type Plan<'py> = PyReadonlyArray2<'py, i64>;
 
 /// Rows of `N` numbers of each frame of an array (F, K, ...).
-pub(crate) fn frames<'a, const N: usize>(
-    name: &str,
-    array: &'a PyReadonlyArrayDyn<'_, f64>,
-) -> PyResult<Vec<&'a [[f64; N]]>> {
+fn frames<'a, const N: usize>(name: &str, array: &'a PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<&'a [[f64; N]]>> {
     let shape = array.shape();
     let valid = shape.len() >= 2 && shape[2..].iter().product::<usize>() == N && array.is_c_contiguous();
     let expected = format_args!("contiguous frames of rows of {N} numbers");
@@ -28,7 +27,7 @@ pub(crate) fn frames<'a, const N: usize>(
 }
 
 /// Rows of a plan.
-pub(crate) fn plan<'a, const N: usize>(plan: &'a Plan<'_>) -> PyResult<&'a [[i64; N]]> {
+fn plan<'a, const N: usize>(plan: &'a Plan<'_>) -> PyResult<&'a [[i64; N]]> {
     let columns = plan.shape()[1];
     unless(columns == N && plan.is_c_contiguous(), "plan", format_args!("{N} columns"), columns)?;
     Ok(plan.as_slice()?.as_chunks().0)
@@ -39,38 +38,30 @@ fn entry<T>(entries: &[T], number: i64) -> Option<&T> {
     entries.get(usize::try_from(number).ok()?)
 }
 
-fn wrong(name: &str, expected: &str) -> PyErr {
-    MeasurementError::new_err(format!("{name}: expected {expected}"))
+fn unplanned() -> PyErr {
+    let expected = "numbers of limbs, joints and frames that are there, and axes that differ";
+    MeasurementError::new_err(format!("plan: expected {expected}"))
 }
 
-pub(crate) fn unplanned() -> PyErr {
-    wrong("plan", "numbers of limbs, joints and frames that are there, and axes that differ")
-}
-
-pub(crate) fn rotation(rows: &[f64; 9]) -> Mat3 {
+fn rotation(rows: &[f64; 9]) -> Mat3 {
     Mat3::from_cols_array(rows).transpose()
 }
 
-pub(crate) fn poses_of(rows: &[[f64; 16]]) -> Vec<(Mat3, Vec3)> {
+fn poses_of(rows: &[[f64; 16]]) -> Vec<(Mat3, Vec3)> {
     rows.iter().map(parts).collect()
 }
 
-pub(crate) fn points_of(rows: &[[f64; 3]]) -> Vec<Vec3> {
+fn points_of(rows: &[[f64; 3]]) -> Vec<Vec3> {
     rows.iter().copied().map(Vec3::from_array).collect()
 }
 
 /// Rotation and translation of a 4x4 matrix.
-pub(crate) fn parts(m: &[f64; 16]) -> (Mat3, Vec3) {
+fn parts(m: &[f64; 16]) -> (Mat3, Vec3) {
     (rotation(&[m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]]), Vec3::new(m[3], m[7], m[11]))
 }
 
 /// Rotations of the bones of a posed body, and where they are joined to their parents.
-pub(crate) fn bones(
-    body: &Body,
-    poses: &[(Mat3, Vec3)],
-    joints: &[Vec3],
-    own: &[[i64; 2]],
-) -> Option<(Vec<Mat3>, Vec<Vec3>)> {
+fn bones(body: &Body, poses: &[(Mat3, Vec3)], joints: &[Vec3], own: &[[i64; 2]]) -> Option<(Vec<Mat3>, Vec<Vec3>)> {
     let found = at_rest(body).into_iter().zip(poses);
     let found = found.map(|((rest, place), &(limb, at))| (limb * rest.transpose(), limb * place + at));
     let (turns, mut heads): (Vec<_>, Vec<_>) = found.unzip();
@@ -81,7 +72,7 @@ pub(crate) fn bones(
 }
 
 /// Place and quaternion of each frame of a plan on its parent.
-pub(crate) fn placed_frames(turns: &[Mat3], points: &[Vec3], plan: &[[i64; 4]]) -> Option<Vec<[f64; 7]>> {
+fn placed_frames(turns: &[Mat3], points: &[Vec3], plan: &[[i64; 4]]) -> Option<Vec<[f64; 7]>> {
     let there = |&[limb, first, second, _]: &[i64; 4]| {
         Some((*entry(turns, limb)?, (*entry(points, first)? + *entry(points, second)?) / 2.0))
     };
@@ -96,7 +87,7 @@ pub(crate) fn placed_frames(turns: &[Mat3], points: &[Vec3], plan: &[[i64; 4]]) 
     Some(found.iter().zip(plan).map(on_parent).collect())
 }
 
-pub(crate) fn angles(turns: &[Mat3], plan: &[[i64; 8]]) -> Option<Vec<f64>> {
+fn angles(turns: &[Mat3], plan: &[[i64; 8]]) -> Option<Vec<f64>> {
     let wrapped = |angle: f64| (angle + PI).rem_euclid(2.0 * PI) - PI;
     let mut last: Option<(&[i64], [f64; 3])> = None;
     let angle = |row| {
@@ -124,7 +115,7 @@ pub(crate) fn angles(turns: &[Mat3], plan: &[[i64; 8]]) -> Option<Vec<f64>> {
 }
 
 /// The covariance of a pose, place before turn, of another point, which is away from its point; turned before.
-pub(crate) fn moved_covariance(covariance: &[[f64; 6]; 6], turn: &Mat3, across: Vec3) -> [[f64; 6]; 6] {
+fn moved_covariance(covariance: &[[f64; 6]; 6], turn: &Mat3, across: Vec3) -> [[f64; 6]; 6] {
     let [x, y, z] = across.to_array();
     let lever = Mat3::from_cols(Vec3::new(0.0, -z, y), Vec3::new(z, 0.0, -x), Vec3::new(-y, x, 0.0));
     let moved = |column: [f64; 6]| {
@@ -140,11 +131,106 @@ pub(crate) fn moved_covariance(covariance: &[[f64; 6]; 6], turn: &Mat3, across: 
 }
 
 /// Middle, rotation x, y, z, w, both diameters, length, and scales of both ends of a limb's cylinder.
-pub(crate) fn cylinder(Limb { shape, .. }: &Limb, &(turn, at): &(Mat3, Vec3)) -> [f64; 12] {
+fn cylinder(Limb { shape, .. }: &Limb, &(turn, at): &(Mat3, Vec3)) -> [f64; 12] {
     let ([x, y, z], [i, j, k, w]) = ((at + turn.z_axis * (shape.length() / 2.0)).to_array(), math::quaternion(&turn));
     let (a, b) = (shape.a0() + shape.a1(), shape.b0() + shape.b1());
     let low = shape.a0() / a + shape.b0() / b;
     [x, y, z, i, j, k, w, a, b, shape.length(), low, 2.0 - low]
+}
+
+#[doc = stub!("Layout")]
+#[pyclass(module = "voodoo._core", frozen)]
+pub(crate) struct Layout {
+    own: Vec<[i64; 2]>,
+    frames: Vec<[i64; 4]>,
+    angles: Vec<[i64; 8]>,
+    arms: Vec<Mat3>,
+    limbs: Vec<[i64; 4]>,
+}
+
+impl Layout {
+    /// Appends the row of a pose. The covariance is that of the first limb's pose, and is still to be turned.
+    fn append(
+        &self,
+        row: &mut Vec<f64>,
+        body: &Body,
+        poses: &[(Mat3, Vec3)],
+        joints: &[Vec3],
+        (covariance, turn): (&[[f64; 6]; 6], &Mat3),
+    ) -> Option<()> {
+        let (turns, heads) = bones(body, poses, joints, &self.own)?;
+        let frames = placed_frames(&turns, &[&heads[..], joints].concat(), &self.frames)?;
+        let limbs: Vec<_> = turns.iter().zip(&self.arms).map(|(turn, arm)| *turn * *arm).collect();
+        let limbs = placed_frames(&limbs, &heads, &self.limbs)?;
+        let &[x, y, z, ..] = frames.first()?;
+        let root = moved_covariance(covariance, turn, Vec3::new(x, y, z) - poses.first()?.1);
+        row.extend_from_slice(frames.as_flattened());
+        body.limbs().iter().zip(poses).for_each(|(limb, pose)| row.extend(cylinder(limb, pose)));
+        joints.iter().for_each(|place| row.extend(place.to_array()));
+        for (turn, head) in turns.iter().zip(&heads) {
+            row.extend(head.to_array());
+            row.extend(math::quaternion(turn));
+        }
+        row.extend(angles(&turns, &self.angles)?);
+        row.extend_from_slice(root.as_flattened());
+        limbs.iter().for_each(|[x, y, z, i, j, k, w]| row.extend([-y, *z, *x, *j, -k, -i, *w]));
+        Some(())
+    }
+}
+
+#[pymethods]
+impl Layout {
+    #[new]
+    fn new(own: Plan<'_>, frames: Plan<'_>, angles: Plan<'_>, arms: Given<'_>, limbs: Plan<'_>) -> PyResult<Self> {
+        let arms = self::frames("arms", &arms)?.concat().iter().map(rotation).collect();
+        let (own, frames) = (plan(&own)?.to_vec(), plan(&frames)?.to_vec());
+        let (angles, limbs) = (plan(&angles)?.to_vec(), plan(&limbs)?.to_vec());
+        Ok(Self { own, frames, angles, arms, limbs })
+    }
+
+    #[doc = stub!("Layout.rows_of_frames")]
+    fn rows_of_frames<'py>(
+        &self,
+        py: Python<'py>,
+        body: &PyBody,
+        poses: Given<'py>,
+        joints: Given<'py>,
+        covariances: Given<'py>,
+    ) -> PyResult<Array<'py>> {
+        let (poses, joints) = (frames("poses", &poses)?, frames("joints", &joints)?);
+        let covariances = frames("covariances", &covariances)?;
+        let mut rows = Vec::new();
+        for ((poses, joints), covariance) in poses.iter().zip(&joints).zip(&covariances) {
+            let covariance = (covariance.first_chunk().ok_or_else(unplanned)?, &Mat3::IDENTITY);
+            let row = self.append(&mut rows, &body.0, &poses_of(poses), &points_of(joints), covariance);
+            row.ok_or_else(unplanned)?;
+        }
+        let columns = rows.len() / poses.len().max(1);
+        array(py, rows, &[poses.len(), columns])
+    }
+
+    #[doc = stub!("Layout.rows")]
+    fn rows<'py>(
+        &self,
+        py: Python<'py>,
+        estimates: Vec<PyRef<'py, PyEstimate>>,
+        bodies: Vec<PyRef<'py, PyBody>>,
+        turn: Option<PyReadonlyArray2<'py, f64>>,
+    ) -> PyResult<Array<'py>> {
+        let turn = turn.as_ref().map(|turn| turn.as_slice()).transpose()?.and_then(|turn| turn.first_chunk());
+        let (turn, shift) = turn.map_or((Mat3::IDENTITY, Vec3::ZERO), parts);
+        let (mut rows, unknown) = (Vec::new(), [[f64::NAN; 6]; 6]);
+        for (PyEstimate { estimate, .. }, body) in estimates.iter().map(|one| &**one).zip(&bodies) {
+            let poses = estimate.world_from_limb.iter();
+            let poses = poses.map(|pose| (turn * Mat3::from_quat(pose.rotation), turn * pose.translation + shift));
+            let joints: Vec<_> = estimate.sites.iter().map(|place| turn * *place + shift).collect();
+            let covariance = estimate.covariances.limbs.first().unwrap_or(&unknown);
+            let row = self.append(&mut rows, &body.0, &poses.collect::<Vec<_>>(), &joints, (covariance, &turn));
+            row.ok_or_else(unplanned)?;
+        }
+        let (count, columns) = (estimates.len(), rows.len() / estimates.len().max(1));
+        array(py, rows, &[count, columns])
+    }
 }
 
 #[doc = stub!("skeleton")]
@@ -170,10 +256,8 @@ pub(crate) fn skeleton<'py>(
 
 /// The leading axes of an array that ends with the given ones.
 fn leading<'a>(array: &'a PyReadonlyArrayDyn<'_, f64>, last: &[usize]) -> PyResult<&'a [usize]> {
-    array.shape().strip_suffix(last).ok_or_else(|| {
-        let text = format!("rotations: expected shape (..., {last:?}), found {:?}", array.shape());
-        MeasurementError::new_err(text)
-    })
+    let (expected, found) = (format_args!("shape (..., {last:?})"), format_args!("{:?}", array.shape()));
+    array.shape().strip_suffix(last).ok_or_else(|| raise(Unexpected::new("rotations", expected, found)))
 }
 
 #[doc = stub!("quaternions")]

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use voodoo_core::Camera;
 use voodoo_core::math::Vec3;
@@ -12,7 +12,7 @@ use voodoo_sensors::skin::depth::DepthBeside;
 
 use crate::arrays::{DepthView, Row, contiguous, vectors};
 use crate::camera::{affine, camera_of};
-use crate::errors::{raise, unless, wrong_argument};
+use crate::errors::{raise, wrong_argument};
 use crate::people::TrackedBody;
 use crate::sites::places_of;
 
@@ -20,12 +20,6 @@ use crate::sites::places_of;
 type Ray = (usize, Row, Option<Row>, f64);
 /// Image, meters per unit, camera and pose of a depth camera.
 type DepthArguments<'py> = (Bound<'py, PyAny>, f64, Bound<'py, PyAny>, PyReadonlyArray2<'py, f64>);
-
-fn colors_of<'a>(image: &'a PyReadonlyArray3<'_, u8>) -> PyResult<&'a [[u8; 3]]> {
-    let found = format_args!("{:?}", image.shape());
-    unless(image.dims()[2] == 3, "image", "shape (height, width, 3)", found)?;
-    Ok(image.as_slice()?.as_chunks().0)
-}
 
 #[doc = stub!("SkinCue")]
 #[pyclass(name = "SkinCue", module = "voodoo._core")]
@@ -109,7 +103,7 @@ impl PySkinCue {
         });
         let others = others.iter().map(TrackedBody::tracker).collect::<PyResult<Vec<_>>>()?;
         let input = SkinInput {
-            image: colors_of(&image)?,
+            image: image.as_slice()?.as_chunks().0,
             stamp,
             eye,
             depth: beside.transpose()?,
@@ -135,7 +129,8 @@ impl PySkinCue {
         #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
     ) -> PyResult<()> {
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
-        let (image, joints, sites) = (colors_of(&image)?, vectors("joints", &joints)?, vectors("sites", &sites)?);
+        let (image, joints, sites) =
+            (image.as_slice()?.as_chunks().0, vectors("joints", &joints)?, vectors("sites", &sites)?);
         let cue = &mut self.0;
         py.detach(|| cue.learn(image, &eye, &joints, &sites)).map_err(raise)
     }

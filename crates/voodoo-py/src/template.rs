@@ -12,23 +12,21 @@ use crate::estimate::PyEstimate;
 #[doc = stub!("Template")]
 #[pyclass(module = "voodoo._core", frozen)]
 pub(crate) struct Template {
-    messages: Vec<u8>,
-    ends: Vec<usize>,
-    /// Where numbers begin, and which they are.
-    places: Vec<(usize, usize)>,
+    messages: Vec<Message>,
     count: usize,
-    stamps: Vec<usize>,
     /// Single precision with the most significant byte first, instead of double precision with the least.
     single: bool,
 }
 
-fn found(messages: &[u8], bytes: &[u8]) -> impl Iterator<Item = usize> {
-    let starts = messages.windows(bytes.len().max(1)).enumerate();
-    starts.filter(move |(_, window)| *window == bytes).map(|(at, _)| at)
+struct Message {
+    bytes: Vec<u8>,
+    /// Where numbers begin, and which they are.
+    numbers: Vec<(usize, usize)>,
+    stamps: Vec<usize>,
 }
 
-fn put(messages: &mut [u8], at: usize, bytes: &[u8]) {
-    if let Some(place) = messages.get_mut(at..at + bytes.len()) {
+fn put(message: &mut [u8], at: usize, bytes: &[u8]) {
+    if let Some(place) = message.get_mut(at..at + bytes.len()) {
         place.copy_from_slice(bytes);
     }
 }
@@ -49,24 +47,23 @@ fn all(parts: &[PyReadonlyArrayDyn<'_, f64>]) -> Vec<f64> {
 impl Template {
     #[new]
     fn new(messages: Vec<Bound<'_, PyBytes>>, first: f64, count: usize, single: bool, stamp: &[u8]) -> PyResult<Self> {
-        let ends = messages.iter().scan(0, |end, message| {
-            *end += message.as_bytes().len();
-            Some(*end)
-        });
-        let ends = ends.collect();
-        let messages: Vec<u8> = messages.iter().flat_map(|message| message.as_bytes()).copied().collect();
-        let place = |at: usize| {
-            let bytes = messages.get(at..)?;
+        let number = |bytes: &[u8]| {
             let number = match single {
                 true => f64::from(f32::from_be_bytes(*bytes.first_chunk()?)),
                 false => f64::from_le_bytes(*bytes.first_chunk()?),
             } - first;
-            (number >= 0.0 && number < count as f64 && number.fract() == 0.0).then_some((at, number as usize))
+            (number >= 0.0 && number < count as f64 && number.fract() == 0.0).then_some(number as usize)
         };
-        let places: Vec<_> = (0..messages.len()).filter_map(place).collect();
-        unless(!places.is_empty() || count == 0, "numbers", "some in the messages", "none")?;
-        let stamps = found(&messages, stamp).collect();
-        Ok(Self { messages, ends, places, count, stamps, single })
+        let message = |message: &Bound<'_, PyBytes>| {
+            let bytes = message.as_bytes();
+            let numbers = (0..bytes.len()).filter_map(|at| Some((at, number(&bytes[at..])?))).collect();
+            let stamps = (0..bytes.len()).filter(|at| !stamp.is_empty() && bytes[*at..].starts_with(stamp)).collect();
+            Message { bytes: bytes.to_vec(), numbers, stamps }
+        };
+        let messages: Vec<Message> = messages.iter().map(message).collect();
+        let found = messages.iter().any(|message| !message.numbers.is_empty());
+        unless(found || count == 0, "numbers", "some in the messages", "none")?;
+        Ok(Self { messages, count, single })
     }
 
     #[doc = stub!("Template.filled")]
@@ -78,38 +75,19 @@ impl Template {
     ) -> PyResult<Vec<Bound<'py, PyBytes>>> {
         let all = all(&numbers);
         unless(all.len() == self.count, "numbers", self.count, all.len())?;
-        let mut messages = self.messages.clone();
-        for &(at, number) in &self.places {
-            if self.single {
-                put(&mut messages, at, &(all[number] as f32).to_be_bytes());
-            } else {
-                put(&mut messages, at, &all[number].to_le_bytes());
+        let filled = |message: &Message| {
+            let mut bytes = message.bytes.clone();
+            for &(at, number) in &message.numbers {
+                if self.single {
+                    put(&mut bytes, at, &(all[number] as f32).to_be_bytes());
+                } else {
+                    put(&mut bytes, at, &all[number].to_le_bytes());
+                }
             }
-        }
-        for at in &self.stamps {
-            put(&mut messages, *at, stamp);
-        }
-        let starts = std::iter::once(&0).chain(&self.ends);
-        let slices = starts.zip(&self.ends).filter_map(|(start, end)| messages.get(*start..*end));
-        Ok(slices.map(|slice| PyBytes::new(py, slice)).collect())
-    }
-}
-
-/// Appends a whole number, which takes a fifth of the time of `write!`.
-fn write_whole(text: &mut Vec<u8>, number: i64) {
-    if number < 0 {
-        text.push(b'-');
-    }
-    let (mut left, start) = (number.unsigned_abs(), text.len());
-    loop {
-        text.push(b'0' + (left % 10) as u8);
-        left /= 10;
-        if left == 0 {
-            break;
-        }
-    }
-    if let Some(digits) = text.get_mut(start..) {
-        digits.reverse();
+            message.stamps.iter().for_each(|at| put(&mut bytes, *at, stamp));
+            PyBytes::new(py, &bytes)
+        };
+        Ok(self.messages.iter().map(filled).collect())
     }
 }
 
@@ -135,7 +113,7 @@ pub(crate) fn people_text<'py>(
     let wrong = || MeasurementError::new_err("text: expected places for all numbers and words, found fewer or more");
     let mut numbers = all(&numbers).into_iter();
     let mut words = std::iter::once(format!("{stamp:?}").into()).chain(estimates.iter().flat_map(|one| words(py, one)));
-    let mut written = Vec::with_capacity(2 * text.len());
+    let (mut written, mut digits) = (Vec::with_capacity(2 * text.len()), itoa::Buffer::new());
     for part in text.split_inclusive(|&byte| byte <= 2) {
         let (&last, before) = part.split_last().unwrap_or((&b' ', part));
         written.extend_from_slice(if last <= 2 { before } else { part });
@@ -143,7 +121,7 @@ pub(crate) fn people_text<'py>(
             written.extend_from_slice(words.next().ok_or_else(wrong)?.as_bytes());
         } else if last <= 2 {
             let number = numbers.next().ok_or_else(wrong)? * if last == 0 { 1e5 } else { 1e6 };
-            write_whole(&mut written, number.round_ties_even() as i64);
+            written.extend_from_slice(digits.format(number.round_ties_even() as i64).as_bytes());
         }
     }
     if words.next().is_some() || numbers.next().is_some() {

@@ -8,12 +8,12 @@ use pyo3::types::PyDict;
 use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::{Body, Frame, RegionLine, TrackError, Tracker};
 
-use crate::arrays::{ColorView, PointView, limb_poses, picture, points, vector, vectors};
+use crate::arrays::{ColorView, PointView, limb_poses, picture, points, vectors};
 use crate::body::{JointParts, PyBody, joint};
 use crate::borrowed::{Borrowed, ColorData, color_images, number};
 use crate::config::config;
 use crate::detector::{detector, warn_of_detector};
-use crate::errors::{raise, unless, wrong_argument};
+use crate::errors::{raise, wrong_argument};
 use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
 use crate::people::TrackedBody;
@@ -31,12 +31,13 @@ pub struct PyTracker {
     detector_failures: usize,
 }
 
-/// Named positions with the indices of their sites.
-pub(crate) fn site_positions(body: &Body, joints: &Bound<'_, PyDict>) -> PyResult<Vec<(usize, Vec3)>> {
-    let place = |(name, position): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
-        let name: String = name.extract()?;
-        let site = body.site_index(&name).map_err(raise)?;
-        Ok((site, vector(&format!("joints[{name}]"), &position)?))
+/// Names and positions of sites.
+pub(crate) type SitePositions = Vec<(String, [f64; 3])>;
+
+/// Positions with the indices of their sites.
+pub(crate) fn site_positions(body: &Body, joints: &SitePositions) -> PyResult<Vec<(usize, Vec3)>> {
+    let place = |(name, position): &(String, [f64; 3])| {
+        Ok((body.site_index(name).map_err(raise)?, Vec3::from_array(*position)))
     };
     joints.iter().map(place).collect()
 }
@@ -54,13 +55,8 @@ pub(crate) fn body_before<'py>(
 
 impl PyTracker {
     /// Indices of the cameras of a frame's color images; a camera is identified by its name.
-    fn cameras_of(&mut self, frame: &PyFrame) -> PyResult<Vec<u16>> {
-        let camera = |data: &ColorData| {
-            let name = &frame.sources[usize::from(data.source)];
-            let (what, expected) = (format_args!("color[{name}].camera"), "no distortion: undistort the picture");
-            unless(!data.camera.distorts(), what, expected, "some")?;
-            Ok(number(&mut self.cameras, name))
-        };
+    fn cameras_of(&mut self, frame: &PyFrame) -> Vec<u16> {
+        let camera = |data: &ColorData| number(&mut self.cameras, &frame.sources[usize::from(data.source)]);
         frame.colors.iter().map(camera).collect()
     }
 
@@ -73,7 +69,7 @@ impl PyTracker {
         question: impl FnOnce(&mut Tracker, &Frame, Option<&[Pose]>) -> Result<T, TrackError> + Send,
     ) -> PyResult<T> {
         let poses = poses.map(|poses| limb_poses(self.tracker.body(), &poses)).transpose()?;
-        let (cameras, views) = (self.cameras_of(frame)?, frame.color_views(py)?);
+        let (cameras, views) = (self.cameras_of(frame), frame.color_views(py)?);
         let colors = color_images(&views, &cameras)?;
         let input = Frame { colors: &colors, ..Frame::empty(frame.stamp) };
         let tracker = &mut self.tracker;
@@ -112,10 +108,10 @@ impl PyTracker {
     }
 
     #[pyo3(signature = (joints, *, fit_sizes=true))]
-    fn _reset(&mut self, joints: &Bound<'_, PyDict>, fit_sizes: bool) -> PyResult<PyEstimate> {
-        let positions = site_positions(self.tracker.body(), joints)?;
+    fn _reset(&mut self, py: Python<'_>, joints: SitePositions, fit_sizes: bool) -> PyResult<PyEstimate> {
+        let positions = site_positions(self.tracker.body(), &joints)?;
         self.tracker.reset(&positions, fit_sizes).map_err(raise)?;
-        self.body_changed(joints.py())?;
+        self.body_changed(py)?;
         self.sources.clear();
         Ok(self.estimate())
     }
@@ -147,7 +143,7 @@ impl PyTracker {
     /// Processes one frame; releases the GIL.
     fn step(&mut self, py: Python<'_>, frame: &PyFrame) -> PyResult<PyEstimate> {
         let borrowed = Borrowed::new(py, frame, self.tracker.body(), 0)?;
-        let cameras = self.cameras_of(frame)?;
+        let cameras = self.cameras_of(frame);
         let tracker = &mut self.tracker;
         borrowed.with_frame(&cameras, |input| py.detach(|| tracker.step(input).map(|_| ())).map_err(raise))?;
         self.sources.clone_from(&frame.sources);
@@ -240,7 +236,7 @@ impl PyTracker {
         parent: &str,
         shape: &PyShape,
         parts: JointParts,
-        sites: Vec<(String, [f64; 3])>,
+        sites: SitePositions,
     ) -> PyResult<()> {
         let sites = sites.into_iter().map(|(name, position)| (name, Vec3::from_array(position))).collect();
         self.tracker.add_limb(name, parent, shape.0, joint(parts), sites).map_err(raise)?;

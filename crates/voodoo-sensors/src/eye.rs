@@ -1,7 +1,7 @@
 //! A color camera and its pose.
 
 use voodoo_core::math::{Affine3, Vec3};
-use voodoo_core::{Camera, TrackError};
+use voodoo_core::{Camera, Unexpected};
 
 /// A camera and its pose.
 #[derive(Clone, Copy, Debug)]
@@ -20,12 +20,9 @@ impl Eye<'_> {
     }
 
     /// Checks that an image has as many pixels as the camera.
-    pub(crate) fn check(&self, name: &str, expected: &'static str, pixels: usize) -> Result<(), TrackError> {
-        if pixels == self.camera.pixels() {
-            return Ok(());
-        }
-        let found = format!("{pixels} for {} pixels", self.camera.pixels());
-        Err(TrackError::measurement(name, expected, found))
+    pub(crate) fn check(&self, name: &str, expected: &'static str, pixels: usize) -> Result<(), Unexpected> {
+        let found = format_args!("{pixels} for {} pixels", self.camera.pixels());
+        Unexpected::unless(pixels == self.camera.pixels(), name, expected, found)
     }
 
     /// Focal point in the world, meters.

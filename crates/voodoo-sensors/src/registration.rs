@@ -1,6 +1,6 @@
 //! Looks up surfaces among depth points registered to the image of a color camera.
 
-use voodoo_core::TrackError;
+use voodoo_core::Unexpected;
 
 /// Depths within this of the nearest 20 % quantile, meters, belong to one surface: a limb is no deeper.
 const ONE_SURFACE: f64 = 0.1;
@@ -11,17 +11,15 @@ const FEWEST_POINTS: usize = 3;
 /// `places` are the columns and rows of points registered to the image, and `depths` their depths, meters.
 ///
 /// # Errors
-/// [`TrackError::Measurement`] when the number of depths differs from that of the points.
+/// [`Unexpected`] when the number of depths differs from that of the points.
 pub fn nearest_surface(
     places: &[[f64; 2]],
     depths: &[f64],
     place: [f64; 2],
     radius: f64,
-) -> Result<Option<f64>, TrackError> {
-    if depths.len() != places.len() {
-        let found = format!("{} for {}", depths.len(), places.len());
-        return Err(TrackError::measurement("depths", "as many depths as pixels", found));
-    }
+) -> Result<Option<f64>, Unexpected> {
+    let found = format_args!("{} for {}", depths.len(), places.len());
+    Unexpected::unless(depths.len() == places.len(), "depths", "as many depths as pixels", found)?;
     let is_near = |other: &[f64; 2]| {
         let (u, v) = (other[0] - place[0], other[1] - place[1]);
         u * u + v * v < radius * radius

@@ -166,18 +166,18 @@ class Body:
 
 def checked_joints(
     joints: Mapping[str, Sequence[float]], *, what: str = "joints"
-) -> dict[str, tuple[float, float, float]]:
-    """Positions by name as plain numbers.
+) -> list[tuple[str, tuple[float, float, float]]]:
+    """Names and positions as plain numbers.
 
     Raises:
         BodyError: not a mapping, or an entry is not three finite numbers; names the entry.
     """
     if not isinstance(joints, Mapping):
         raise BodyError(f"{what}: expected a mapping of names to positions, found {type(joints).__name__}")
-    checked = {}
+    checked = []
     for name, position in joints.items():
         x, y, z = numbers_of(f"{what}[{name}]", position, BodyError, "three finite meters", count=3).tolist()
-        checked[name] = (x, y, z)
+        checked.append((name, (x, y, z)))
     return checked
 
 

@@ -295,4 +295,4 @@ def _is_colored(item: Any) -> bool:  # noqa: ANN401
 
 def nobody(stamp: float) -> Estimate:
     """The estimate of a frame in which nobody is tracked: status "searching", no joints, no limbs."""
-    return _core._nobody(stamp)
+    return _core._estimate({"stamp": stamp}, (), (), (), ())

@@ -26,7 +26,7 @@ def body_with_markers(body: Body, markers: Mapping[str, tuple[str, Sequence[floa
     Raises:
         BodyError: an unknown limb, a name that is taken, or an offset that is not three finite numbers.
     """
-    offsets = checked_joints({name: offset for name, (_, offset) in markers.items()}, what="markers")
+    offsets = dict(checked_joints({name: offset for name, (_, offset) in markers.items()}, what="markers"))
     name, limbs, sites = body.core.parts()
     for marker, (limb, _) in markers.items():
         if limb not in body.limb_names:

@@ -1,7 +1,7 @@
 //! Edits of a body between frames (K06 IV: scale, dimensions, adding and removing parts). Each returns a new body.
 
 use super::{Body, Joint, Limb, Site};
-use crate::error::BodyError;
+use crate::error::{BodyError, Unexpected};
 use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
@@ -11,7 +11,7 @@ pub(crate) type Pair = Vec<usize>;
 impl Body {
     /// The body with all lengths multiplied by `factor`.
     pub fn scaled(&self, factor: f64) -> Result<Self, BodyError> {
-        BodyError::unless(factor.is_finite() && factor > 0.0, "factor", "a finite factor above zero", factor)?;
+        Unexpected::unless(factor.is_finite() && factor > 0.0, "factor", "a finite factor above zero", factor)?;
         let scale_pose = |pose: &Pose| Pose::from_parts(pose.translation * factor, pose.rotation);
         let mut body = self.clone();
         for limb in &mut body.limbs {
@@ -102,7 +102,7 @@ impl Body {
     /// The body without a limb, its sites and its descendants, and the indices of the remaining limbs.
     pub fn without_limb(&self, name: &str) -> Result<(Self, Vec<usize>), BodyError> {
         let removed = self.limb_index(name)?;
-        BodyError::unless(removed > 0, "limb", "a limb other than the root", name)?;
+        Unexpected::unless(removed > 0, "limb", "a limb other than the root", name)?;
         let stays =
             |limb: &usize| !std::iter::successors(Some(*limb), |limb| self.parent(*limb)).any(|up| up == removed);
         let kept: Vec<usize> = (0..self.limbs.len()).filter(stays).collect();

@@ -2,7 +2,7 @@
 
 use super::{Body, Joint, JointKind};
 use crate::body::kinematics::joint_turn;
-use crate::error::TrackError;
+use crate::error::{TrackError, Unexpected};
 use crate::math::{Mat3, Moments, Pose, Quat, Vec3, is_place};
 
 /// A hinge bent by less than this does not determine its axis: sine of the angle between its limbs.
@@ -46,9 +46,11 @@ impl Body {
     /// between known landmarks of the same limb; then every limb is stretched and its landmarks are moved to the measured
     /// positions. Positions that require a scale above ten or below a tenth are rejected.
     pub fn fit(&self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<(Self, Vec<Pose>), TrackError> {
-        for (site, position) in positions {
-            let (what, found) = (format_args!("joints[{}]", self.sites()[*site].name), format_args!("{position:?}"));
-            TrackError::unless(is_place(*position), what, "finite meters, 1e9 at most", found)?;
+        for (index, position) in positions {
+            let unknown = || Unexpected::new("joints", "the index of a site", index);
+            let site = self.sites.get(*index).ok_or_else(unknown)?;
+            let (what, found) = (format_args!("joints[{}]", site.name), format_args!("{position:?}"));
+            Unexpected::unless(is_place(*position), what, "finite meters, 1e9 at most", found)?;
         }
         let farthest = positions.iter().map(|(_, position)| position.abs().max_element()).fold(0.0, f64::max);
         if farthest <= NEAR_ORIGIN {
@@ -70,7 +72,7 @@ impl Body {
         let world_from_rest = body.overall_orientation(positions)?;
         let expected = "meters, between a tenth and ten times the body's own distances";
         let plausible = (1.0 / LARGEST..=LARGEST).contains(&scale);
-        TrackError::unless(plausible, "joints", expected, format_args!("{scale:.4} times"))?;
+        Unexpected::unless(plausible, "joints", expected, format_args!("{scale:.4} times"))?;
         let rest = body.rest_pose(Pose::IDENTITY);
         let mut poses: Vec<Pose> = Vec::with_capacity(rest.len());
         for limb in 0..rest.len() {
@@ -176,7 +178,8 @@ impl Body {
                 }
             }
         }
-        Err(TrackError::Underdetermined { found: positions.len() })
+        let expected = "at least three positions that do not lie on a line";
+        Err(Unexpected::new("joints", expected, format_args!("{} position(s)", positions.len())).into())
     }
 
     fn orient_limb(
@@ -218,25 +221,22 @@ impl Body {
 
     /// The axis of a hinge at the distal end of a limb: in the limb frame, and in the world as the bent child determines it.
     fn hinge_axis(&self, limb: usize, positions: &[(usize, Vec3)]) -> Option<(Vec3, Vec3)> {
-        for (index, parent, joint) in self.joints() {
-            if parent != limb || joint.kind() != JointKind::Hinge {
-                continue;
-            }
-            let center = self.roles.joint_site(index);
-            let (start, bend) = (measured(self.roles.joint_site(limb), positions)?, measured(center, positions)?);
-            let own = |site: &usize| self.sites()[*site].limb == index && Some(*site) != center;
-            let end = (0..self.sites().len()).filter(own).find_map(|site| measured(Some(site), positions));
-            // If the child has no site of its own, the joint of its own child gives its direction: a hand's wrist.
-            let end = end.or_else(|| {
-                let away = |local: Vec3| (local - joint.limb_from_joint.translation).length();
-                let landmarks = self.known_landmarks(index, positions).into_iter();
-                let far = landmarks.filter(|(local, _)| away(*local) > FAR_END * self.limbs[index].shape.length());
-                far.max_by(|a, b| away(a.0).total_cmp(&away(b.0))).map(|(_, position)| position)
-            })?;
-            let normal = (bend - start).normalize_or_zero().cross((end - bend).normalize_or_zero());
-            return (normal.length() > BENT).then(|| (joint.parent_from_joint.rotation * Vec3::X, normal.normalize()));
-        }
-        None
+        let is_at_end =
+            |(_, parent, joint): &(usize, usize, &Joint)| *parent == limb && joint.kind() == JointKind::Hinge;
+        let (index, _, joint) = self.joints().find(is_at_end)?;
+        let center = self.roles.joint_site(index);
+        let (start, bend) = (measured(self.roles.joint_site(limb), positions)?, measured(center, positions)?);
+        let own = |site: &usize| self.sites()[*site].limb == index && Some(*site) != center;
+        let end = (0..self.sites().len()).filter(own).find_map(|site| measured(Some(site), positions));
+        // If the child has no site of its own, the joint of its own child gives its direction: a hand's wrist.
+        let end = end.or_else(|| {
+            let away = |local: Vec3| (local - joint.limb_from_joint.translation).length();
+            let landmarks = self.known_landmarks(index, positions).into_iter();
+            let far = landmarks.filter(|(local, _)| away(*local) > FAR_END * self.limbs[index].shape.length());
+            far.max_by(|a, b| away(a.0).total_cmp(&away(b.0))).map(|(_, position)| position)
+        })?;
+        let normal = (bend - start).normalize_or_zero().cross((end - bend).normalize_or_zero());
+        (normal.length() > BENT).then(|| (joint.parent_from_joint.rotation * Vec3::X, normal.normalize()))
     }
 
     /// Moves the landmarks of a limb to their measured positions and stretches its shape accordingly.

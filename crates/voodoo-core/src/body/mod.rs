@@ -18,7 +18,7 @@ pub(crate) use model::Model;
 pub(crate) use roles::JointRole;
 pub use roles::{LimbRole, Roles, Side};
 
-use crate::error::BodyError;
+use crate::error::{BodyError, Unexpected};
 use crate::math::{Pose, Vec3, is_place, is_rigid};
 use crate::shape::TaperedEllipticCylinder;
 use std::fmt::{Arguments, Display};
@@ -196,33 +196,31 @@ impl Body {
         distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(closest, _)| closest)
     }
 
-    fn check(&self) -> Result<(), BodyError> {
-        if self.limbs.is_empty() {
-            return Err(BodyError::Empty);
-        }
+    fn check(&self) -> Result<(), Unexpected> {
+        Unexpected::unless(!self.limbs.is_empty(), "body", "at least one limb", "none")?;
         let (limbs, sites) = (self.limbs.len(), self.sites.len());
         let (fits, found) = (limbs <= MOST_LIMBS && sites <= MOST_SITES, format_args!("{limbs} and {sites}"));
-        BodyError::unless(fits, "body", "at most 1,000 limbs and 10,000 sites", found)?;
+        Unexpected::unless(fits, "body", "at most 1,000 limbs and 10,000 sites", found)?;
         check_letters("name", &self.name)?;
         for (index, limb) in self.limbs.iter().enumerate() {
             let key = format_args!("limbs.{}", limb.name);
             check_name(key, &limb.name, self.limbs[..index].iter().map(|other| &other.name))?;
             let parent_key = format_args!("{key}.parent");
             let Some((parent, joint)) = &limb.parent else {
-                BodyError::unless(index == 0, parent_key, "a parent (only the first limb is the root)", "none")?;
+                Unexpected::unless(index == 0, parent_key, "a parent (only the first limb is the root)", "none")?;
                 continue;
             };
             let (expected, found) = ("a limb that stands before this one", format_args!("limb {parent}"));
-            BodyError::unless(*parent < index, parent_key, expected, found)?;
+            Unexpected::unless(*parent < index, parent_key, expected, found)?;
             check_letters(format_args!("{key}.joint.name"), &joint.name)?;
             check_joint(format_args!("{key}.joint"), joint)?;
         }
         for (index, site) in self.sites.iter().enumerate() {
             let key = format_args!("sites.{}", site.name);
             check_name(key, &site.name, self.sites[..index].iter().map(|other| &other.name))?;
-            BodyError::unless(site.limb < limbs, format_args!("{key}.limb"), "the index of a limb", site.limb)?;
+            Unexpected::unless(site.limb < limbs, format_args!("{key}.limb"), "the index of a limb", site.limb)?;
             let (key, found) = (format_args!("{key}.position"), site.position.to_array());
-            BodyError::unless(is_place(site.position), key, "finite meters, 1e9 at most", format_args!("{found:?}"))?;
+            Unexpected::unless(is_place(site.position), key, "finite meters, 1e9 at most", format_args!("{found:?}"))?;
         }
         Ok(())
     }
@@ -232,25 +230,23 @@ fn check_name<'a>(
     key: impl Display,
     name: &str,
     mut before: impl Iterator<Item = &'a String>,
-) -> Result<(), BodyError> {
-    BodyError::unless(!name.is_empty(), &key, "a name", "an empty one")?;
+) -> Result<(), Unexpected> {
+    Unexpected::unless(!name.is_empty(), &key, "a name", "an empty one")?;
     check_letters(&key, name)?;
-    if before.any(|known| known == name) {
-        return Err(BodyError::Duplicate { key: key.to_string(), name: name.into() });
-    }
-    Ok(())
+    let is_new = !before.any(|known| known == name);
+    Unexpected::unless(is_new, key, "a name of its own", format_args!("{name:?}, which is already taken"))
 }
 
 /// Rejects characters that break file formats: tabs and line breaks separate table cells, braces delimit trees of bones.
-fn check_letters(key: impl Display, name: &str) -> Result<(), BodyError> {
+fn check_letters(key: impl Display, name: &str) -> Result<(), Unexpected> {
     let breaks = |letter: char| letter.is_control() || matches!(letter, '{' | '}' | '\u{2028}' | '\u{2029}');
     let (expected, found) = ("a name without tabs, line breaks and braces", format_args!("{name:?}"));
-    BodyError::unless(!name.contains(breaks), key, expected, found)
+    Unexpected::unless(!name.contains(breaks), key, expected, found)
 }
 
-fn check_joint(key: impl Display, joint: &Joint) -> Result<(), BodyError> {
+fn check_joint(key: impl Display, joint: &Joint) -> Result<(), Unexpected> {
     let check = |valid: bool, field: &str, expected, found: Arguments| {
-        BodyError::unless(valid, format_args!("{key}.{field}"), expected, found)
+        Unexpected::unless(valid, format_args!("{key}.{field}"), expected, found)
     };
     let Joint { semi_axes, weight, motion, limits, .. } = joint;
     let valid = semi_axes.iter().all(|axis| axis.is_finite() && *axis >= 0.0);

@@ -30,9 +30,6 @@ impl Model {
 
     /// Fits sizes and world poses so that sites (index, world position) lie at the given positions; see [`Body::fit`].
     pub(crate) fn fit(&self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<(Body, Vec<Pose>), TrackError> {
-        if let Some((site, _)) = positions.iter().find(|(site, _)| *site >= self.body.sites().len()) {
-            return Err(TrackError::measurement("joints", "the index of a site", site.to_string()));
-        }
         let start = if fit_sizes { &self.reference_body } else { &self.body };
         start.fit(positions, fit_sizes)
     }

@@ -4,7 +4,7 @@
 //! and features that need roles are disabled for it.
 
 use super::{Limb, Site};
-use crate::error::BodyError;
+use crate::error::Unexpected;
 
 /// Side of the body, as the person's own left or right; see [`Roles`] for an example.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,16 +112,14 @@ roles! {
 }
 
 impl JointRole {
-    /// The preceding joint of the same arm or leg, and the resulting requirement for the body as a message.
-    fn after(self) -> Option<(Self, &'static str)> {
+    /// The preceding joint of the same arm or leg.
+    fn before(self) -> Option<Self> {
         match self {
-            Self::Shoulder(side) => {
-                Some((Self::Sternoclavicular(side), "a shoulder beyond the sternoclavicular joint of its side"))
-            }
-            Self::Elbow(side) => Some((Self::Shoulder(side), "an elbow beyond the shoulder of its side")),
-            Self::Wrist(side) => Some((Self::Elbow(side), "a wrist beyond the elbow of its side")),
-            Self::Knee(side) => Some((Self::Hip(side), "a knee beyond the hip of its side")),
-            Self::Ankle(side) => Some((Self::Knee(side), "an ankle beyond the knee of its side")),
+            Self::Shoulder(side) => Some(Self::Sternoclavicular(side)),
+            Self::Elbow(side) => Some(Self::Shoulder(side)),
+            Self::Wrist(side) => Some(Self::Elbow(side)),
+            Self::Knee(side) => Some(Self::Hip(side)),
+            Self::Ankle(side) => Some(Self::Knee(side)),
             _ => None,
         }
     }
@@ -151,9 +149,9 @@ impl Roles {
     /// Resolves the names of a body in which parents precede their children.
     ///
     /// # Errors
-    /// [`BodyError::Value`] when a limb and its joint are named after different sides, or when a joint of an arm or leg does not
+    /// [`Unexpected`] when a limb and its joint are named after different sides, or when a joint of an arm or leg does not
     /// follow the preceding one. Detections and statistics of human joints would otherwise be applied to the wrong limbs.
-    pub(super) fn resolve<'a>(limbs: &'a [Limb], sites: &[Site]) -> Result<Self, BodyError> {
+    pub(super) fn resolve<'a>(limbs: &'a [Limb], sites: &[Site]) -> Result<Self, Unexpected> {
         let joint_name = |limb: &'a Limb| limb.parent.as_ref().map(|(_, joint)| joint.name.as_str());
         let site = |name: &str| sites.iter().position(|site| site.name == name);
         let roles = Self {
@@ -166,7 +164,7 @@ impl Roles {
         Ok(roles)
     }
 
-    fn check(&self, limbs: &[Limb], sites: &[Site]) -> Result<(), BodyError> {
+    fn check(&self, limbs: &[Limb], sites: &[Site]) -> Result<(), Unexpected> {
         let parent = |limb: usize| limbs[limb].parent.as_ref().map(|(parent, _)| *parent);
         let opposite = |limb: usize, name: &str| {
             let sides = self.limb(limb).and(Side::of(&limbs[limb].name)).zip(Side::of(name));
@@ -175,17 +173,18 @@ impl Roles {
         for (index, limb) in limbs.iter().enumerate() {
             let (Some((hangs_on, joint)), Some(role)) = (&limb.parent, self.joints[index]) else { continue };
             let key = format_args!("limbs.{}.joint.name", limb.name);
-            BodyError::unless(!opposite(index, &joint.name), key, "a joint of the limb's own side", &joint.name)?;
+            Unexpected::unless(!opposite(index, &joint.name), key, "a joint of the limb's own side", &joint.name)?;
             // A second joint of the same name belongs to another limb that is attached there.
-            let Some((before, expected)) = role.after().filter(|_| self.limb_at(role) == Some(index)) else { continue };
-            let Some(before) = self.limb_at(before) else { continue };
+            let before = role.before().filter(|_| self.limb_at(role) == Some(index));
+            let Some(before) = before.and_then(|before| self.limb_at(before)) else { continue };
             let follows = std::iter::successors(Some(*hangs_on), |limb| parent(*limb)).any(|limb| limb == before);
-            BodyError::unless(follows, key, expected, format_args!("{} on {}", joint.name, limbs[*hangs_on].name))?;
+            let expected = format_args!("a joint of a limb that hangs on {}", limbs[before].name);
+            Unexpected::unless(follows, key, expected, format_args!("{} on {}", joint.name, limbs[*hangs_on].name))?;
         }
         for site in sites {
             let (key, found) = (format_args!("sites.{}.limb", site.name), &limbs[site.limb].name);
             let valid = JointRole::from_name(&site.name).is_none() || !opposite(site.limb, &site.name);
-            BodyError::unless(valid, key, "a limb of the site's own side", found)?;
+            Unexpected::unless(valid, key, "a limb of the site's own side", found)?;
         }
         Ok(())
     }
@@ -228,7 +227,7 @@ impl Roles {
 }
 
 /// Splits a name into its side and the rest.
-fn split(name: &str) -> (Option<Side>, &str) {
+pub(super) fn split(name: &str) -> (Option<Side>, &str) {
     match (name.strip_prefix("l_"), name.strip_prefix("r_")) {
         (Some(stem), _) => (Some(Side::Left), stem),
         (_, Some(stem)) => (Some(Side::Right), stem),
@@ -255,6 +254,7 @@ fn groups<'a>(limbs: &'a [Limb]) -> Vec<u16> {
 mod tests {
     use super::*;
     use crate::body::{Body, HumanModel, Joint};
+    use crate::error::BodyError;
     use crate::math::{Pose, Vec3};
     use crate::shape::TaperedEllipticCylinder;
 
@@ -385,7 +385,7 @@ mod tests {
         );
         assert_eq!(
             refused(&[["torso", ""], ["low", "l_elbow"], ["high", "l_shoulder"]]),
-            "limbs.low.joint.name: expected an elbow beyond the shoulder of its side, found l_elbow on torso"
+            "limbs.low.joint.name: expected a joint of a limb that hangs on high, found l_elbow on torso"
         );
         // Without its shoulder, an elbow may be attached anywhere.
         assert!(chain(&[["torso", ""], ["low", "l_elbow"], ["high", "r_shoulder"]]).is_ok());

@@ -4,7 +4,7 @@
 //! distorted position. The formulas and the order of coefficients are those of OpenCV (documentation of `calib3d` and of
 //! `fisheye`).
 
-use crate::error::CameraError;
+use crate::error::Unexpected;
 
 /// The distortion model of a lens, with its coefficients.
 ///
@@ -14,7 +14,7 @@ use crate::error::CameraError;
 /// let lens = Lens::from_model("plumb_bob", &[-0.25, 0.08, 0.001, -0.002])?; // as in a CameraInfo of ROS
 /// assert_eq!(lens, Lens::PlumbBob([-0.25, 0.08, 0.001, -0.002, 0.0]));
 /// assert_eq!(Lens::from_model("plumb_bob", &[0.0; 5])?, Lens::Pinhole);
-/// # Ok::<(), voodoo_core::CameraError>(())
+/// # Ok::<(), voodoo_core::Unexpected>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Lens {
@@ -48,19 +48,19 @@ impl Lens {
     /// `inverse_plumb_bob` (0, 4 or 5). Polynomials whose coefficients are all zero give a pinhole.
     ///
     /// # Errors
-    /// [`CameraError`] when the model is unknown or the number of coefficients does not fit it.
-    pub fn from_model(model: &str, coefficients: &[f64]) -> Result<Self, CameraError> {
+    /// [`Unexpected`] when the model is unknown or the number of coefficients does not fit it.
+    pub fn from_model(model: &str, coefficients: &[f64]) -> Result<Self, Unexpected> {
         let counts: (&[usize], &'static str) = match model {
             "plumb_bob" | "inverse_plumb_bob" => (&[0, 4, 5], "0, 4 or 5 coefficients"),
             "rational_polynomial" => (&[0, 8, 12, 14], "0, 8, 12 or 14 coefficients"),
             "equidistant" => (&[0, 4], "0 or 4 coefficients"),
             _ => {
                 let expected = "plumb_bob, rational_polynomial, equidistant or inverse_plumb_bob";
-                return Err(CameraError { what: "model", expected, found: format!("{model:?}") });
+                return Err(Unexpected::new("camera model", expected, format_args!("{model:?}")));
             }
         };
         let found = format_args!("{} for {model}: {coefficients:?}", coefficients.len());
-        CameraError::unless(counts.0.contains(&coefficients.len()), "distortion", counts.1, found)?;
+        Unexpected::unless(counts.0.contains(&coefficients.len()), "camera distortion", counts.1, found)?;
         let straight = coefficients.iter().all(|value| *value == 0.0);
         Ok(match model {
             "equidistant" => Self::Fisheye(padded(coefficients)),

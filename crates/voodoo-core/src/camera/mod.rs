@@ -5,7 +5,7 @@ mod lens;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
-use crate::error::CameraError;
+use crate::error::Unexpected;
 use crate::math::Vec3;
 
 pub use lens::Lens;
@@ -28,7 +28,7 @@ const SIDE_PARTS: usize = 16;
 /// use voodoo_core::{Camera, Lens};
 /// use voodoo_core::math::Vec3;
 ///
-/// # fn main() -> Result<(), voodoo_core::CameraError> {
+/// # fn main() -> Result<(), voodoo_core::Unexpected> {
 /// let lens = Lens::PlumbBob([-0.25, 0.08, 0.001, -0.002, 0.0]);
 /// let camera = Camera::new(320, 240, [250.0, 252.0, 161.0, 118.0], lens)?;
 /// let pixel = camera.project(Vec3::new(0.4, -0.3, 2.0)).unwrap();
@@ -70,18 +70,18 @@ impl Camera {
     /// A camera of `width` x `height` pixels with the `intrinsics` `(fx, fy, cx, cy)`, pixels.
     ///
     /// # Errors
-    /// [`CameraError`] unless there are 1 to 33,554,432 pixels, the focal lengths are above zero, and all numbers are finite.
-    pub fn new(width: usize, height: usize, intrinsics: [f64; 4], lens: Lens) -> Result<Self, CameraError> {
+    /// [`Unexpected`] unless there are 1 to 33,554,432 pixels, the focal lengths are above zero, and all numbers are finite.
+    pub fn new(width: usize, height: usize, intrinsics: [f64; 4], lens: Lens) -> Result<Self, Unexpected> {
         let valid = width.checked_mul(height).is_some_and(|count| (1..=MOST_PIXELS).contains(&count));
-        CameraError::unless(valid, "size", "1 to 33554432 pixels", format_args!("{width}x{height}"))?;
+        Unexpected::unless(valid, "camera size", "1 to 33554432 pixels", format_args!("{width}x{height}"))?;
         let [fx, fy, cx, cy] = intrinsics;
         let valid = fx > 0.0 && fy > 0.0 && fx.is_finite() && fy.is_finite();
-        CameraError::unless(valid, "fx, fy", "finite focal lengths above zero", format_args!("{fx}, {fy}"))?;
+        Unexpected::unless(valid, "camera fx, fy", "finite focal lengths above zero", format_args!("{fx}, {fy}"))?;
         let valid = cx.is_finite() && cy.is_finite();
-        CameraError::unless(valid, "cx, cy", "a finite principal point", format_args!("{cx}, {cy}"))?;
+        Unexpected::unless(valid, "camera cx, cy", "a finite principal point", format_args!("{cx}, {cy}"))?;
         let coefficients = lens.coefficients();
         let valid = coefficients.iter().all(|value| value.is_finite());
-        CameraError::unless(valid, "distortion", "finite coefficients", format_args!("{coefficients:?}"))?;
+        Unexpected::unless(valid, "camera distortion", "finite coefficients", format_args!("{coefficients:?}"))?;
         let table = OnceLock::new();
         Ok(Self { width, height, focal: [fx, fy], center: [cx, cy], lens, domain: lens.domain(), table })
     }
@@ -90,7 +90,7 @@ impl Camera {
     ///
     /// # Errors
     /// As [`Camera::new`].
-    pub fn pinhole(width: usize, height: usize, intrinsics: [f64; 4]) -> Result<Self, CameraError> {
+    pub fn pinhole(width: usize, height: usize, intrinsics: [f64; 4]) -> Result<Self, Unexpected> {
         Self::new(width, height, intrinsics, Lens::Pinhole)
     }
 

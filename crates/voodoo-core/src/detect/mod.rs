@@ -203,7 +203,7 @@ impl Detection {
 /// let mut depth = Vec::new();
 /// around.open_depth(&image, &mut depth);
 /// assert_eq!(depth, [2.0, 0.0]); // without the pixel inside the excluded box
-/// # Ok::<(), voodoo_core::CameraError>(())
+/// # Ok::<(), voodoo_core::Unexpected>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Surroundings<'a> {

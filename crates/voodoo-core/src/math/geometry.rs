@@ -11,8 +11,7 @@ pub use glam::{DAffine3 as Affine3, DMat3 as Mat3, DQuat as Quat, DVec3 as Vec3}
 use std::ops::Mul;
 
 /// A rigid transform: a rotation, then a translation.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Pose {
     /// A unit quaternion.
     pub rotation: Quat,

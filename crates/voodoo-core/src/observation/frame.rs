@@ -4,7 +4,7 @@ use std::fmt::Display;
 
 use crate::body::Body;
 use crate::camera::Camera;
-use crate::error::TrackError;
+use crate::error::{TrackError, Unexpected};
 use crate::math::{Aabb, Pose, Vec3, is_place, is_rigid};
 use crate::observation::picture::ColorImage;
 
@@ -140,7 +140,7 @@ impl DepthPixels<'_> {
 ///     source: 0,
 /// };
 /// assert_eq!(image.back_project(4 + 1, 2.0), Vec3::new(0.0, 0.0, 2.0)); // row 1, column 1: the principal point
-/// # Ok::<(), voodoo_core::CameraError>(())
+/// # Ok::<(), voodoo_core::Unexpected>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct DepthImage<'a> {
@@ -341,7 +341,7 @@ impl Frame<'_> {
     /// Depth images and point clouds may hold NaN only where the sensor had no return. In a depth image it counts as "no
     /// return"; in a cloud it is an error (drop such rows before).
     pub fn check(&self, body: &Body, previous_stamp: Option<f64>) -> Result<(), TrackError> {
-        TrackError::unless(self.stamp.is_finite(), "stamp", "a finite time in seconds", self.stamp)?;
+        Unexpected::unless(self.stamp.is_finite(), "stamp", "a finite time in seconds", self.stamp)?;
         if let Some(previous) = previous_stamp.filter(|previous| *previous >= self.stamp) {
             return Err(TrackError::TimeBackwards { previous, found: self.stamp });
         }
@@ -350,18 +350,18 @@ impl Frame<'_> {
             check_pose(format_args!("points[{index}].world_from_sensor"), &cloud.world_from_sensor)?;
             if let Scope::Limb(limb) = cloud.scope {
                 let (what, valid) = (format_args!("points[{index}].limb"), limb < body.limbs().len());
-                TrackError::unless(valid, what, "the index of a limb", limb)?;
+                Unexpected::unless(valid, what, "the index of a limb", limb)?;
             }
             if let Some(row) = (0..cloud.points.len()).find(|row| !is_place(cloud.points.get(*row))) {
                 let found = format!("{:?} in row {row}", cloud.points.get(row).to_array());
-                return Err(TrackError::measurement(format!("points[{index}].points"), PLACE, found));
+                Unexpected::unless(false, format_args!("points[{index}].points"), PLACE, found)?;
             }
         }
         for (index, image) in self.images.iter().enumerate() {
             let (what, unit) = (format_args!("depth[{index}]"), image.meters_per_unit);
             check_size(format_args!("{what}.image"), image.pixels.len(), image.camera)?;
             let valid = unit > 0.0 && unit.is_finite();
-            TrackError::unless(valid, format_args!("{what}.meters_per_unit"), "a finite length above zero", unit)?;
+            Unexpected::unless(valid, format_args!("{what}.meters_per_unit"), "a finite length above zero", unit)?;
             check_weight(format_args!("{what}.weight"), image.weight)?;
             check_pose(format_args!("{what}.world_from_sensor"), &image.world_from_sensor)?;
         }
@@ -376,7 +376,7 @@ impl Frame<'_> {
                 check_position(format_args!("detections[{index}].positions[{number}]"), relation, body)?;
             }
             let what = format_args!("detections[{index}].person");
-            TrackError::unless(!detection.person.is_nan(), what, "log odds", "NaN")?;
+            Unexpected::unless(!detection.person.is_nan(), what, "log odds", "NaN")?;
         }
         for (index, relation) in self.rays.iter().enumerate() {
             let what = format_args!("rays[{index}]");
@@ -385,61 +385,61 @@ impl Frame<'_> {
             check_place(format_args!("{what}.direction"), relation.direction)?;
             let (known, found) = (relation.direction.length() >= 1e-9, relation.direction.to_array());
             let (what, found) = (format_args!("{what}.direction"), format_args!("{found:?}"));
-            TrackError::unless(known, what, "a vector that is not zero", found)?;
+            Unexpected::unless(known, what, "a vector that is not zero", found)?;
         }
         if let Some(Ground { normal, offset }) = self.ground {
             let valid = offset.is_finite() && normal.is_normalized();
             let found = format_args!("normal {:?} and offset {offset}", normal.to_array());
-            TrackError::unless(valid, "ground", "a unit normal and a finite offset", found)?;
+            Unexpected::unless(valid, "ground", "a unit normal and a finite offset", found)?;
         }
         for (index, Aabb { mins, maxs }) in self.excluded.iter().enumerate() {
             let valid = mins.is_finite() && maxs.is_finite() && mins.cmple(*maxs).all();
             let found = format_args!("{:?} to {:?}", mins.to_array(), maxs.to_array());
-            TrackError::unless(valid, format_args!("excluded[{index}]"), "a low and a high corner", found)?;
+            Unexpected::unless(valid, format_args!("excluded[{index}]"), "a low and a high corner", found)?;
         }
         Ok(())
     }
 }
 
 /// Rejects an image that has not a value for every pixel of its camera.
-pub(super) fn check_size(what: impl Display, pixels: usize, camera: &Camera) -> Result<(), TrackError> {
+pub(super) fn check_size(what: impl Display, pixels: usize, camera: &Camera) -> Result<(), Unexpected> {
     let found = format_args!("{pixels} for {}x{}", camera.width(), camera.height());
-    TrackError::unless(pixels == camera.pixels(), what, "all pixels of the camera", found)
+    Unexpected::unless(pixels == camera.pixels(), what, "all pixels of the camera", found)
 }
 
-fn check_position(what: impl Display, relation: &PositionRelation, body: &Body) -> Result<(), TrackError> {
+fn check_position(what: impl Display, relation: &PositionRelation, body: &Body) -> Result<(), Unexpected> {
     check_relation(&what, relation.site, relation.weight, relation.bias, body)?;
     check_place(format_args!("{what}.position"), relation.position)
 }
 
-fn check_relation(what: impl Display, site: usize, weight: f64, bias: f64, body: &Body) -> Result<(), TrackError> {
+fn check_relation(what: impl Display, site: usize, weight: f64, bias: f64, body: &Body) -> Result<(), Unexpected> {
     let valid = site < body.sites().len();
-    TrackError::unless(valid, format_args!("{what}.site"), "the index of a site", site)?;
+    Unexpected::unless(valid, format_args!("{what}.site"), "the index of a site", site)?;
     check_weight(format_args!("{what}.weight"), weight)?;
     let valid = bias.is_finite() && bias >= 0.0;
-    TrackError::unless(valid, format_args!("{what}.bias"), "a finite length, zero or above", bias)
+    Unexpected::unless(valid, format_args!("{what}.bias"), "a finite length, zero or above", bias)
 }
 
-fn check_weight(what: impl Display, weight: f64) -> Result<(), TrackError> {
-    TrackError::unless(weight.is_finite() && weight > 0.0, what, "a finite weight above zero", weight)
+fn check_weight(what: impl Display, weight: f64) -> Result<(), Unexpected> {
+    Unexpected::unless(weight.is_finite() && weight > 0.0, what, "a finite weight above zero", weight)
 }
 
 /// What is expected of a position.
 const PLACE: &str = "finite meters, 1e9 at most";
 
 /// Rejects a position that is not valid.
-fn check_place(what: impl Display, place: Vec3) -> Result<(), TrackError> {
-    TrackError::unless(is_place(place), what, PLACE, format_args!("{:?}", place.to_array()))
+fn check_place(what: impl Display, place: Vec3) -> Result<(), Unexpected> {
+    Unexpected::unless(is_place(place), what, PLACE, format_args!("{:?}", place.to_array()))
 }
 
-pub(crate) fn check_pose(what: impl Display, pose: &Pose) -> Result<(), TrackError> {
-    TrackError::unless(is_rigid(pose), what, "a rigid transform", format_args!("{pose:?}"))
+pub(crate) fn check_pose(what: impl Display, pose: &Pose) -> Result<(), Unexpected> {
+    Unexpected::unless(is_rigid(pose), what, "a rigid transform", format_args!("{pose:?}"))
 }
 
 /// Rejects other than one valid pose for each limb.
-pub(crate) fn check_poses(body: &Body, world_from_limb: &[Pose]) -> Result<(), TrackError> {
+pub(crate) fn check_poses(body: &Body, world_from_limb: &[Pose]) -> Result<(), Unexpected> {
     let [poses, limbs] = [world_from_limb.len(), body.limbs().len()];
     let found = format_args!("{poses} poses for {limbs} limbs, or one not finite");
     let valid = poses == limbs && world_from_limb.iter().all(is_rigid);
-    TrackError::unless(valid, "world_from_limb", "one rigid pose a limb", found)
+    Unexpected::unless(valid, "world_from_limb", "one rigid pose a limb", found)
 }

@@ -1,7 +1,7 @@
 //! Color and grayscale images.
 
 use crate::camera::Camera;
-use crate::error::TrackError;
+use crate::error::Unexpected;
 use crate::math::Pose;
 use crate::observation::frame::{check_pose, check_size};
 
@@ -79,14 +79,14 @@ pub struct ColorImage<'a> {
 
 impl ColorImage<'_> {
     /// Returns an error for an unusable image; `index` is its index in a frame with this `stamp`, after `others`.
-    pub(super) fn check(&self, index: usize, stamp: f64, others: &[Self]) -> Result<(), TrackError> {
+    pub(super) fn check(&self, index: usize, stamp: f64, others: &[Self]) -> Result<(), Unexpected> {
         let (what, near) = (format_args!("color[{index}]"), (self.stamp - stamp).abs() <= LONGEST_ASIDE);
         let expected = "a time within 0.25 s of the frame's";
-        TrackError::unless(near, format_args!("{what}.stamp"), expected, self.stamp)?;
+        Unexpected::unless(near, format_args!("{what}.stamp"), expected, self.stamp)?;
         check_size(format_args!("{what}.image"), self.pixels.len(), self.camera)?;
         check_pose(format_args!("{what}.world_from_sensor"), &self.world_from_sensor)?;
         let first = others.iter().all(|other| other.number != self.number);
         let (what, found) = (format_args!("{what}.source"), "a second one of this");
-        TrackError::unless(first, what, "one picture of each camera", found)
+        Unexpected::unless(first, what, "one picture of each camera", found)
     }
 }

@@ -1,7 +1,7 @@
 //! The empty scene of a camera: a background color per pixel, and the likelihood of another color there.
 
 use super::histogram::{Kind, SIDE};
-use crate::error::TrackError;
+use crate::error::Unexpected;
 use crate::observation::picture::{ColorImage, ColorPixels};
 
 /// Minimum standard deviation of a channel, of 255: sensor noise and compression.
@@ -23,10 +23,10 @@ pub(super) struct EmptyScene {
 
 impl EmptyScene {
     /// The mean and variance of images of one size (height, width) and kind.
-    pub(super) fn from_pictures(pictures: &[(ColorPixels, [usize; 2])]) -> Result<Self, TrackError> {
+    pub(super) fn from_pictures(pictures: &[(ColorPixels, [usize; 2])]) -> Result<Self, Unexpected> {
         let wrong = |index: usize, found: String| {
             let expected = "pictures of the empty scene, all of one size and kind";
-            Err(TrackError::measurement(format!("images[{index}]"), expected, found))
+            Err(Unexpected::new(format!("images[{index}]"), expected, found))
         };
         let Some((first, size)) = pictures.first() else { return wrong(0, "none".into()) };
         let kind = Kind::new(first);
@@ -65,12 +65,12 @@ impl EmptyScene {
     }
 
     /// Returns an error for an image that cannot be compared with the empty scene.
-    pub(super) fn check(&self, picture: &ColorImage, index: usize) -> Result<(), TrackError> {
+    pub(super) fn check(&self, picture: &ColorImage, index: usize) -> Result<(), Unexpected> {
         let [height, width] = [picture.camera.height(), picture.camera.width()];
         let valid = self.size == [height, width] && self.kind == Kind::new(&picture.pixels);
         let (what, expected) = (format_args!("color[{index}].image"), "a picture like those of the empty scene");
         let found = format_args!("{width}x{height} beside {}x{}", self.size[1], self.size[0]);
-        TrackError::unless(valid, what, expected, found)
+        Unexpected::unless(valid, what, expected, found)
     }
 
     /// Log-likelihood of this color at a pixel that does not show the body; `around` is the log-likelihood under the colors of

@@ -17,7 +17,7 @@ mod segment;
 
 use crate::association::correspondence::{Correspondences, RegionPair};
 use crate::body::Body;
-use crate::error::TrackError;
+use crate::error::{TrackError, Unexpected};
 use crate::math::{Pose, Vec3, refill, reset, shifted};
 use crate::observation::frame::Frame;
 use crate::observation::picture::{ColorImage, ColorPixels};
@@ -163,7 +163,7 @@ impl ColorRegions {
         for (index, picture) in frame.colors.iter().enumerate() {
             let expected = "a pinhole camera: take the distortion out of the picture";
             let (what, lens) = (format_args!("color[{index}].camera"), picture.camera.lens());
-            TrackError::unless(!picture.camera.distorts(), what, expected, format_args!("{lens:?}"))?;
+            Unexpected::unless(!picture.camera.distorts(), what, expected, format_args!("{lens:?}"))?;
             let known = self.cameras.get(&picture.number);
             known.and_then(|camera| camera.scene.as_ref()).map_or(Ok(()), |scene| scene.check(picture, index))?;
         }

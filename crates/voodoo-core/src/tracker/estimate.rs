@@ -10,8 +10,7 @@ use crate::uncertainty::Covariances;
 /// How much a pose can be relied on.
 ///
 /// [`Estimate`] has an example.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum Status {
     /// Measurements support the pose.
@@ -41,8 +40,7 @@ impl Status {
 /// How much the pose of one limb can be relied on.
 ///
 /// [`Estimate`] has an example.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum LimbStatus {
     /// Measurements support it.
@@ -69,8 +67,7 @@ impl LimbStatus {
 /// Contribution of one source to a step.
 ///
 /// [`Estimate`] has an example.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub struct SourceReport {
     /// Number of measurements of the source that were candidates.
@@ -108,8 +105,8 @@ pub struct SourceReport {
 /// println!("{}, standard deviation along x {:.3} m", estimate.sites[wrist], variance.x_axis.x.sqrt());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
 #[non_exhaustive]
 pub struct Estimate {
     /// Time of the frame; NaN after a reset and before the first one.

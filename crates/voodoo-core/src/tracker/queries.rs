@@ -4,7 +4,7 @@ use super::BodyTracker;
 use super::estimate::Estimate;
 use crate::body::Body;
 use crate::config::Config;
-use crate::error::TrackError;
+use crate::error::{TrackError, Unexpected};
 use crate::math::{Aabb, Points, Pose, Vec3, shifted};
 use crate::observation::frame::{Frame, PointSlice};
 use crate::regions::{ColorRegions, Posed, RegionLine};
@@ -164,9 +164,8 @@ impl BodyTracker {
         let mut queries = Points::default();
         for index in 0..points.len() {
             let point = points.get(index);
-            let found = point.to_array();
-            let found = format_args!("{found:?} in row {index}");
-            TrackError::unless(point.is_finite(), "points", "finite meters", found)?;
+            let found = format_args!("{:?} in row {index}", point.to_array());
+            Unexpected::unless(point.is_finite(), "points", "finite meters", found)?;
             queries.push((point - self.motion.origin).to_array().map(|value| value as f32));
         }
         Ok(queries)

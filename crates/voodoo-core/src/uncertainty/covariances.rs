@@ -8,8 +8,7 @@ use crate::math::{Mat3, Vec3, reset};
 /// Covariances of a frame's pose. World frame, meters, radians; NaN before the first frame.
 ///
 /// [`Estimate`](crate::Estimate) has an example.
-#[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Covariances {
     /// Covariance of the position of every site.
     pub sites: Vec<Mat3>,

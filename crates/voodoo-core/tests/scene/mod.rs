@@ -9,7 +9,6 @@
 use std::f64::consts::{PI, TAU};
 
 use voodoo_core::Camera;
-use voodoo_core::Value;
 use voodoo_core::math::{Pose, Quat, Vec3};
 use voodoo_core::{Body, Config, Estimate};
 use voodoo_core::{Cloud, DepthImage, DepthPixels, Frame, PointSlice, Scope};
@@ -188,11 +187,10 @@ pub(crate) fn with<T>(mut value: T, change: impl FnOnce(&mut T)) -> T {
 
 /// The default configuration with each solver there is.
 pub(crate) fn every_solver() -> Vec<Config> {
-    let fields = Config::default().fields();
-    let words = fields.iter().find(|field| field.name == "solver").map_or(&[] as &[&str], |field| field.words);
+    let words = Config::FIELDS.iter().find(|field| field.name == "solver").map_or(&[] as &[&str], |field| field.words);
     let with = |word: &&str| {
         let mut config = Config::default();
-        config.set("solver", &Value::Word((*word).to_owned())).unwrap();
+        config.set("solver", *word).unwrap();
         config
     };
     words.iter().map(with).collect()

@@ -55,7 +55,9 @@ def shown(step: Step, root_frame: str) -> Shown:
     number, first = next(iter(found.items()))
     layout = layout_of(first.joint_names, step.bodies[number].limb_tree, step.bodies[number].limb_joints)
     cores = [step.bodies[number].core for number in found]
-    rows, known = layout.core.rows(list(found.values()), cores, turn.pose if turn.words else None)
+    rows = layout.core.rows(list(found.values()), cores, turn.pose if turn.words else None)
+    *_, covariances, _ = layout.parts(rows)
+    known = np.isfinite(covariances[:, 0]).tolist()
     seen = [statuses[number] != "lost" for number in found]
     there, sure = tuple(compress(found, seen)), tuple(compress(known, seen))
     return Shown(
