@@ -323,7 +323,7 @@ mod tests {
         let names = ["l_thigh", "r_thigh", "l_calf", "r_calf"];
         for wrong in [0.92, 1.08] {
             let set = changed(&body, &names, wrong, 1.0);
-            let found = followed(&body, &set, &Config::default(), false, 40);
+            let found = followed(&body, &set, &Config::default(), false, 20);
             for name in names {
                 let off = length(&found, name) / length(&body, name) - 1.0;
                 assert!(off.abs() < 0.05, "{name} is off by {off} after {}", wrong - 1.0);
