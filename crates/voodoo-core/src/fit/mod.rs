@@ -157,23 +157,25 @@ impl Fit {
         self.regions.find_single_edges(context.posed(poses), &mut self.correspondences.regions);
     }
 
-    /// The information on the relative lengths of `pairs` of limbs, (G, G), and the gradient with respect to these, of the
-    /// correspondences at `poses`. `None` when they are not determined, or the solver cannot estimate them.
+    /// Writes the relative changes of the lengths of `pairs` of limbs that fit the correspondences at `poses` to `change`. On input,
+    /// `change` holds the change from each length to the one it is regularized to, with information `pull`. Returns false when
+    /// the lengths are not determined, or the solver cannot estimate them.
     pub(crate) fn lengths(
         &mut self,
         context: Context,
         predicted: &[Pose],
         poses: &[Pose],
         pairs: &[Pair],
-    ) -> Option<(&[f64], &[f64])> {
+        pull: &[f64],
+        change: &mut [f64],
+    ) -> bool {
         let Self { whole_body, correspondences, .. } = self;
-        if !context.config.solver.is_whole_body() {
-            return None;
-        }
         let step = context.config.max_steps;
-        // A site with a bias cannot measure a length.
-        whole_body.sum_terms(Problem { context, correspondences, predicted, step }, poses, false);
-        whole_body.chain.lengths(&context.model.body, poses, pairs)
+        context.config.solver.is_whole_body() && {
+            // A site with a bias cannot measure a length.
+            whole_body.sum_terms(Problem { context, correspondences, predicted, step }, poses, false);
+            whole_body.chain.lengths(&context.model.body, poses, pairs, pull, change)
+        }
     }
 
     /// Warm start: follows the measured positions of named sites before the frame's steps.

@@ -33,8 +33,8 @@ pub(super) const FOUND_SHARE: f64 = 0.5;
 pub(super) const ASIDE_SIGMA: f64 = 0.01;
 /// Number of successive frames that have the information of one, because their edge errors are correlated.
 pub(crate) const ALIKE: f64 = 10.0;
-/// Time constant of the sizes in frames: older information fades because clothes move.
-pub(super) const REMEMBERED: f64 = 100.0;
+/// Time constant of the girth estimate in frames: older information fades because clothes move.
+const REMEMBERED: f64 = 100.0;
 /// Minimum number of matched points for a girth step.
 const ENOUGH: usize = 15;
 

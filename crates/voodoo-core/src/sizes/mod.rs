@@ -1,5 +1,4 @@
-//! Sizes of the body: girths fitted to the first frame after a reset, and girths and lengths refined by later frames with a Kalman
-//! filter. Errors of successive frames are correlated, so each frame has a tenth of its information.
+//! Sizes of the body: fitted to the first frame after a reset and refined by later frames.
 
 mod color_girth;
 pub(crate) mod girth;
@@ -10,20 +9,20 @@ use crate::body::{Body, Model, Pair};
 use crate::config::Config;
 use crate::detect::{Detected, JointMap};
 use crate::fit::{CONTOUR_FROM, Fit, Setting};
-use crate::math::{Pose, Vec3, solve_in_place};
-use crate::solver::Gate;
+use crate::math::{Pose, Vec3};
+use crate::solver::{Gate, LENGTH_INFORMATION};
 use color_girth::ColorGirths;
 use girth::{
-    ALIKE, ASIDE_SIGMA, FOUND_SHARE, GIRTH_STEPS, Girth, GirthPrior, REMEMBERED, TIP_FACTORS, first_system,
-    follow_girth, side_system, start_girth,
+    ASIDE_SIGMA, FOUND_SHARE, GIRTH_STEPS, Girth, GirthPrior, TIP_FACTORS, first_system, follow_girth, side_system,
+    start_girth,
 };
 pub(crate) use reported::LengthEstimate;
 use reported::ReportedLengths;
 
 /// Points farther than this from the given pose are not used for the sizes, meters.
 const START_GATE: Gate = Gate { box_margin: 0.10, distance: 0.10 };
-/// Information on the relative length of a limb, before any frame: a standard deviation of 4.5 %.
-pub(crate) const LENGTH_INFORMATION: f64 = 5e2;
+/// Greatest relative change of a limb's length in one frame.
+const LENGTH_STEP: f64 = 0.02;
 /// Limits of the factor by which all frames together change a limb's length.
 const LENGTH_FACTORS: [f64; 2] = [0.5, 2.0];
 
@@ -52,13 +51,10 @@ pub(crate) struct Sizes {
     color_girths: ColorGirths,
     /// Groups of limbs with a common length that is refined; empty where the lengths are known.
     pub pairs: Vec<Pair>,
-    /// The factor by which each group was lengthened since the sizes were set, and the information of all frames on the relative
-    /// lengths, (G, G).
+    /// The factor by which each group was lengthened since the sizes were set, and buffers for the next change and its prior.
     stretched: Vec<f64>,
-    information: Vec<f64>,
-    /// Buffers for the next change and its normal equations.
     change: Vec<f64>,
-    normal: Vec<f64>,
+    pull: Vec<f64>,
     /// Lengths reported by detections of an auto-initialized body.
     pub reported: ReportedLengths,
 }
@@ -121,7 +117,6 @@ impl Sizes {
     fn follow_lengths(&mut self, model: &Model) {
         self.pairs = model.body.pairs();
         self.stretched = vec![1.0; self.pairs.len()];
-        self.information.clear();
     }
 
     /// Fits the sizes to the first frame after a reset, whose pose is known.
@@ -170,8 +165,8 @@ impl Sizes {
     }
 
     /// Finds the depth contour of a frame in which the body was fitted at `poses`, from which sizes are estimated, and refines the
-    /// lengths unless the body is `lost`: a Gauss-Newton step of the lengths that all frames and the reported lengths make most likely.
-    /// The joints stay closed.
+    /// lengths unless the body is `lost`, with a prior from the reported lengths: those of a seated start are rough. The joints
+    /// stay closed.
     pub(crate) fn refine_lengths(
         &mut self,
         setting: Setting,
@@ -188,29 +183,21 @@ impl Sizes {
         if self.pairs.is_empty() || lost {
             return;
         }
-        let Self { pairs, stretched, information, change, normal, reported, .. } = self;
-        let Some((frame, gradient)) = fit.lengths(setting.with_model(model), predicted, poses, pairs) else { return };
-        if !frame.iter().chain(gradient).all(|value| value.is_finite()) {
-            return;
-        }
-        let count = pairs.len();
-        information.resize(count * count, 0.0);
-        for (known, frame) in information.iter_mut().zip(frame) {
-            *known = *known * (1.0 - 1.0 / REMEMBERED) + frame / ALIKE;
-        }
-        normal.clone_from(information);
+        let Self { pairs, stretched, change, pull, reported, .. } = self;
         change.clear();
-        for (row, (pair, stretched)) in pairs.iter().zip(stretched.iter()).enumerate() {
-            let (factor, prior) = reported.factor(map, pair[0]).unwrap_or((1.0, LENGTH_INFORMATION));
-            normal[row * count + row] += prior;
-            change.push(prior * (factor - stretched) - gradient[row] / ALIKE);
+        pull.clear();
+        for (pair, stretched) in pairs.iter().zip(stretched.iter()) {
+            let (factor, information) = reported.factor(map, pair[0]).unwrap_or((1.0, LENGTH_INFORMATION[1]));
+            change.push(factor - stretched);
+            pull.push(information);
         }
-        if !solve_in_place(normal, change, count) {
+        if !fit.lengths(setting.with_model(model), predicted, poses, pairs, pull, change) {
             return;
         }
         let [shortest, longest] = LENGTH_FACTORS;
         for ((pair, total), change) in pairs.iter().zip(stretched).zip(change.iter()) {
-            let factor = (*total + change).clamp(shortest, longest) / *total;
+            let factor = ((*total + change.clamp(-LENGTH_STEP, LENGTH_STEP)) / *total)
+                .clamp(shortest / *total, longest / *total);
             *total *= factor;
             pair.iter().for_each(|limb| model.body.change_length(*limb, factor));
         }

@@ -1,6 +1,7 @@
 //! Lengths of limbs and stature that a detector reports, averaged over detections. They are less precise for a sitting person
 //! than for a standing one.
 
+use super::girth::ALIKE;
 use crate::detect::{Detected, JointMap};
 
 /// Relative standard deviation of the stature below which the sizes count as known. The detector reports 4 to 6 % for persons who
@@ -50,10 +51,11 @@ impl ReportedLengths {
     }
 
     /// Returns the ratio of a limb's mean reported length to the length from which the sizes were set, and the information of
-    /// that ratio. `None` if the length was not reported.
+    /// that ratio, multiplied by `ALIKE` for comparison with that of one frame, whose points have correlated errors. `None` if
+    /// the length was not reported.
     pub(super) fn factor(&self, map: &JointMap, limb: usize) -> Option<(f64, f64)> {
         let known = self.0.get(map.length_of_limb(limb)?)?;
-        (known.information > 0.0).then(|| ((known.mean - known.set).exp(), known.information))
+        (known.information > 0.0).then(|| ((known.mean - known.set).exp(), ALIKE * known.information))
     }
 }
 
@@ -85,11 +87,11 @@ mod tests {
     fn who_stands_up_is_as_tall_as_the_surer_detections_report_and_later_ones_that_follow_are_worth_no_more() {
         let (sitting, standing) = ([1.0, 0.05], [0.9, 0.02]);
         let (factor, information, uncertain) = reported(&[sitting; 9]);
-        assert!((factor - 1.0).abs() < 1e-12 && (information - 1.0 / 0.0025).abs() < 1e-6 && uncertain);
+        assert!((factor - 1.0).abs() < 1e-12 && (information - ALIKE / 0.0025).abs() < 1e-6 && uncertain);
         let mut detections = vec![sitting; 9];
         detections.extend([standing; 2]);
         let (factor, information, uncertain) = reported(&detections);
-        assert!((0.9..0.91).contains(&factor) && (information - 1.0 / 0.0004).abs() < 1e-6 && !uncertain, "{factor}");
+        assert!((0.9..0.91).contains(&factor) && (information - ALIKE / 0.0004).abs() < 1e-6 && !uncertain, "{factor}");
         detections.push(sitting);
         let (again, after, uncertain) = reported(&detections);
         assert!(again - factor < 0.02 && after == information && !uncertain, "{again} after {factor}");

@@ -2,21 +2,33 @@
 
 use nalgebra::Vector6;
 
-use super::ChainSolver;
+use super::{ChainSolver, LENGTH_INFORMATION};
 use crate::body::{Body, Pair};
-use crate::math::{Pose, Vec3, dot, factor, half_substitute, reset, vectorized};
+use crate::math::{Pose, Vec3, dot, factor, half_substitute, reset, solve_in_place, vectorized};
 
 impl ChainSolver {
-    /// The information matrix of the relative changes of length of `pairs`, and the gradient with respect to these, after
-    /// elimination of the pose unknowns (Schur complement). `None` when these are not determined.
-    pub(crate) fn lengths(&mut self, body: &Body, poses: &[Pose], pairs: &[Pair]) -> Option<(&[f64], &[f64])> {
+    /// Writes the relative change of length of each pair to `change`: the Gauss-Newton step of the lengths after elimination of
+    /// the pose unknowns (Schur complement), damped, and pulled towards the initial value of `change` by `pull`.
+    pub(crate) fn lengths(
+        &mut self,
+        body: &Body,
+        poses: &[Pose],
+        pairs: &[Pair],
+        pull: &[f64],
+        change: &mut [f64],
+    ) -> bool {
         self.assemble(body, poses, 0.0);
         self.couple(body, poses, pairs);
         if !factor(&mut self.h, self.chain.freedoms) {
-            return None;
+            return false;
         }
-        self.eliminate(pairs.len());
-        Some((&self.reduced, &self.gradient))
+        let count = pairs.len();
+        self.eliminate(count);
+        for row in 0..count {
+            self.reduced[row * count + row] += LENGTH_INFORMATION[0] + pull[row];
+            change[row] = pull[row] * change[row] - self.gradient[row];
+        }
+        solve_in_place(&mut self.reduced, change, count)
     }
 
     /// Returns the information of the relative length of each of `pairs` on its own, with the pose unknowns eliminated. Uses the
