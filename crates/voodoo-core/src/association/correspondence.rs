@@ -64,31 +64,16 @@ pub(crate) struct DetectedPair {
 
 /// A point of a limb's rim and the edge that an image shows there: a distance along one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct ContourPair {
+pub(crate) struct EdgePair {
     /// The limb.
     pub limb: usize,
     /// The rim's point.
     pub x: Vec3,
-    /// Direction perpendicular to the limb and to the line of sight.
+    /// Direction outward in which the edge was searched for, unit length.
     pub normal: Vec3,
     /// Distance of the edge outward along the direction, meters; negative when the observed limb is narrower than the model.
     pub distance: f64,
-    /// Weight from 0 to 1.
-    pub weight: f64,
-}
-
-/// A point of a limb's contour and the color edge there in an image: a distance along one direction.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct RegionPair {
-    /// The limb.
-    pub limb: usize,
-    /// The contour's point.
-    pub x: Vec3,
-    /// Direction in which the projected point moves perpendicular to the contour, outward, unit length.
-    pub normal: Vec3,
-    /// Distance of the edge outward along the direction, meters.
-    pub distance: f64,
-    /// Information of the edge from its colors, 1/m^2.
+    /// Information of the edge, 1/m^2.
     pub information: f64,
     /// Index of the source.
     pub source: u16,
@@ -138,9 +123,9 @@ pub(crate) struct Correspondences {
     /// Joints of a detection.
     pub detected: Vec<DetectedPair>,
     /// Rims of limbs and the depth contour of the body.
-    pub contour: Vec<ContourPair>,
+    pub contour: Vec<EdgePair>,
     /// Contours of limbs and color edges.
-    pub regions: Vec<RegionPair>,
+    pub regions: Vec<EdgePair>,
     /// Color evidence for each limb; empty without color images.
     pub region_support: Vec<RegionSupport>,
     /// Elastic bands.
