@@ -3,7 +3,6 @@
 mod detected;
 mod edges;
 mod floor;
-mod free_space;
 mod limits;
 pub(crate) mod normal_equations;
 mod penetration;
@@ -16,7 +15,6 @@ mod surface;
 pub(crate) use detected::DetectedJoints;
 pub(crate) use edges::Edges;
 pub(crate) use floor::Floor;
-pub(crate) use free_space::free_space_cost;
 pub(crate) use limits::Limits;
 pub(crate) use penetration::Penetration;
 pub(crate) use posture::Posture;

@@ -3,9 +3,7 @@
 
 use nalgebra::Vector6;
 use proptest::prelude::*;
-use voodoo_core::association::correspondence::{
-    Correspondences, DetectedPair, EdgePair, LimbMatches, SitePair,
-};
+use voodoo_core::association::correspondence::{Correspondences, DetectedPair, EdgePair, LimbMatches, SitePair};
 use voodoo_core::body::HumanModel;
 use voodoo_core::body::kinematics::exp;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3, rotation_vector};

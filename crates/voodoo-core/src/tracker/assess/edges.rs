@@ -43,7 +43,7 @@ impl Assessor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::association::correspondence::{Correspondences, LimbMatches, EdgePair};
+    use crate::association::correspondence::{Correspondences, EdgePair, LimbMatches};
     use crate::body::Model;
     use crate::config::Config;
     use crate::math::{Pose, Vec3};
