@@ -1,7 +1,7 @@
 //! The objective by which poses of a frame are compared: the cost of all terms.
 
 use crate::association::correspondence::Correspondences;
-use crate::fit::Context;
+use crate::fit::{Context, Fit};
 use crate::math::Pose;
 use crate::regions::ColorRegions;
 use crate::solver::{OVERLAP_SIGMA, SITE_SCALE};
@@ -30,7 +30,13 @@ pub(crate) struct Objective<'a> {
     pub regions: Option<&'a ColorRegions>,
 }
 
-impl Objective<'_> {
+impl<'a> Objective<'a> {
+    /// That of matched poses, with the colors where these compare poses.
+    pub(super) fn new(context: Context<'a>, fit: &'a Fit, poses: &'a [Pose], clutter: f64) -> Self {
+        let regions = context.compares_colors().then_some(&fit.regions);
+        Self { context, correspondences: &fit.correspondences, poses, clutter, regions }
+    }
+
     /// Cost of the pose of one limb but for the points.
     pub(crate) fn limb(&self, poses: &[Pose], limb: usize) -> f64 {
         let Self { context, correspondences, regions, .. } = *self;
@@ -64,7 +70,6 @@ impl Objective<'_> {
 mod tests {
     use super::*;
     use crate::body::Model;
-    use crate::fit::Fit;
     use crate::math::Vec3;
     use crate::testing::{before_wall, moved, put_board, raised, standing, turned, with_context, without_background};
 
