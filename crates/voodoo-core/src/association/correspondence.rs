@@ -96,21 +96,17 @@ pub(crate) struct RegionSupport {
     pub area: f64,
 }
 
-/// One elastic band: it joins the same point of a joint on the parent and on the child (K07 4.3).
+/// One end of an elastic band, which joins the same point of a joint on the parent and on the child (K07 4.3).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Band {
-    /// Parent limb.
-    pub parent: usize,
-    /// Child limb.
-    pub child: usize,
-    /// End on the parent.
-    pub on_parent: Vec3,
-    /// End on the child.
-    pub on_child: Vec3,
-    /// Artificial weight, relative to the parent's measurements.
-    pub parent_weight: f64,
-    /// Artificial weight, relative to the child's measurements.
-    pub child_weight: f64,
+pub(crate) struct BandEnd {
+    /// The limb that it pulls.
+    pub limb: usize,
+    /// The end on that limb.
+    pub x: Vec3,
+    /// The end on the other limb, the target.
+    pub p: Vec3,
+    /// Artificial weight, relative to the limb's measurements.
+    pub weight: f64,
 }
 
 /// All correspondences of one ICP step.
@@ -128,8 +124,8 @@ pub(crate) struct Correspondences {
     pub regions: Vec<EdgePair>,
     /// Color evidence for each limb; empty without color images.
     pub region_support: Vec<RegionSupport>,
-    /// Elastic bands.
-    pub bands: Vec<Band>,
+    /// Elastic bands, each with both of its ends.
+    pub bands: Vec<BandEnd>,
 }
 
 impl LimbMatches {
