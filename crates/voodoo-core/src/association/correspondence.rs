@@ -193,43 +193,34 @@ impl Correspondences {
     /// Mean squared distance of the surface points that fit, meters squared. Geman-McClure weights of `scale` suppress points
     /// that belong to something else.
     pub(crate) fn scatter(&self, scale: f64) -> Option<f64> {
-        let (mut weight, mut sum) = (0.0, 0.0);
         let inverse_square = 1.0 / (scale * scale);
-        for limb in &self.limbs {
-            let fitting = |fraction, distance| {
-                let square = f64::from(distance) * f64::from(distance);
-                let falloff = 1.0 / (1.0 + square * inverse_square);
-                let fits = f64::from(fraction) * (falloff * falloff);
-                [fits, fits * square]
-            };
-            let [fits, squares] = vectorized!(in_lanes(&limb.weight, &limb.surface.signed_distance, fitting));
-            weight += fits;
-            sum += squares;
-        }
-        (weight > 0.0).then(|| sum / weight)
+        let fitting = |fraction, distance| {
+            let square = f64::from(distance) * f64::from(distance);
+            let falloff = 1.0 / (1.0 + square * inverse_square);
+            let fits = f64::from(fraction) * (falloff * falloff);
+            [fits, fits * square]
+        };
+        let weigh = |limb: &LimbMatches| vectorized!(in_lanes(&limb.weight, &limb.surface.signed_distance, fitting));
+        weighted_mean(self.limbs.iter().map(|limb| weigh(limb).into()))
     }
 
     /// Weighted mean of the squared distances of all measured pairs (K06 III-B step 2), `None` without any.
     pub(crate) fn mean_squared_distance(&self) -> Option<f64> {
-        let (mut weight, mut sum) = (0.0, 0.0);
-        for limb in &self.limbs {
-            let (total, squares) = limb.weighed();
-            weight += total;
-            sum += squares;
-        }
-        for pair in &self.sites {
-            weight += pair.weight;
-            sum += pair.weight * (pair.x - pair.p).length_squared();
-        }
-        (weight > 0.0).then(|| sum / weight)
+        let weigh = |pair: &SitePair| (pair.weight, pair.weight * (pair.x - pair.p).length_squared());
+        weighted_mean(self.limbs.iter().map(LimbMatches::weighed).chain(self.sites.iter().map(weigh)))
     }
 
     /// Mean squared distance of the color edges, weighted by their information; `None` without any.
     pub(crate) fn mean_squared_edge(&self) -> Option<f64> {
-        let weight: f64 = self.regions.iter().map(|pair| pair.information).sum();
-        let sum: f64 = self.regions.iter().map(|pair| pair.information * pair.distance * pair.distance).sum();
-        (weight > 0.0).then(|| sum / weight)
+        let weigh = |pair: &EdgePair| (pair.information, pair.information * pair.distance * pair.distance);
+        weighted_mean(self.regions.iter().map(weigh))
     }
+}
+
+/// Mean of values, given as weights and weighted values; `None` without weight.
+fn weighted_mean(values: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
+    let (weight, sum) = values.fold((0.0, 0.0), |(weight, sum), (own, value)| (weight + own, sum + value));
+    (weight > 0.0).then(|| sum / weight)
 }
 
 #[cfg(test)]
