@@ -1,6 +1,6 @@
 //! The depth contour of limbs: where, perpendicular to a limb, the body ends and the camera sees past it.
 
-use crate::association::correspondence::ContourPair;
+use crate::association::correspondence::EdgePair;
 use crate::body::{Body, Limb};
 use crate::math::{Points, Pose, Vec3, refill, smooth_step, vectorized};
 use crate::observation::depth_view::{DepthView, Pixel};
@@ -175,6 +175,8 @@ struct LimbEdge {
     limb: usize,
     edge: DepthEdge,
     target: Vec3,
+    /// Index of the image's source.
+    source: u16,
     /// Distances from the edge to the limb and to the nearest other one, meters.
     own: f32,
     others: f32,
@@ -195,7 +197,8 @@ impl Contours {
                 edges(&view, part, pose, |edge| {
                     self.places.push(edge.place.to_array().map(|value| value as f32));
                     let target = *pose * (edge.foot + edge.side * (edge.reach - edge.rim));
-                    self.edges.push(LimbEdge { limb, edge, target, own: f32::INFINITY, others: f32::INFINITY });
+                    let (source, own, others) = (view.image.source, f32::INFINITY, f32::INFINITY);
+                    self.edges.push(LimbEdge { limb, edge, target, source, own, others });
                 });
             }
         }
@@ -222,11 +225,12 @@ impl Contours {
         self.edges.iter().filter(own).map(|found| found.edge)
     }
 
-    /// The rim points at `poses` and the edges that were found, as pairs.
-    pub(crate) fn pairs(&self, poses: &[Pose], pairs: &mut Vec<ContourPair>) {
-        let pair = |LimbEdge { limb, edge, target, .. }: &LimbEdge| {
+    /// The rim points at `poses` and the edges that were found, as pairs. `sigma` is the standard deviation of an edge, meters.
+    pub(crate) fn pairs(&self, poses: &[Pose], sigma: f64, pairs: &mut Vec<EdgePair>) {
+        let pair = |LimbEdge { limb, edge, target, source, .. }: &LimbEdge| {
             let (x, normal) = (poses[*limb] * edge.foot, poses[*limb].rotation * edge.side);
-            ContourPair { limb: *limb, x, normal, distance: normal.dot(*target - x), weight: edge.weight }
+            let information = 1.0 / (sigma * sigma) * edge.weight;
+            EdgePair { limb: *limb, x, normal, distance: normal.dot(*target - x), information, source: *source }
         };
         refill(pairs, self.edges.iter().map(pair));
     }

@@ -64,31 +64,16 @@ pub(crate) struct DetectedPair {
 
 /// A point of a limb's rim and the edge that an image shows there: a distance along one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct ContourPair {
+pub(crate) struct EdgePair {
     /// The limb.
     pub limb: usize,
     /// The rim's point.
     pub x: Vec3,
-    /// Direction perpendicular to the limb and to the line of sight.
+    /// Direction outward in which the edge was searched for, unit length.
     pub normal: Vec3,
     /// Distance of the edge outward along the direction, meters; negative when the observed limb is narrower than the model.
     pub distance: f64,
-    /// Weight from 0 to 1.
-    pub weight: f64,
-}
-
-/// A point of a limb's contour and the color edge there in an image: a distance along one direction.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct RegionPair {
-    /// The limb.
-    pub limb: usize,
-    /// The contour's point.
-    pub x: Vec3,
-    /// Direction in which the projected point moves perpendicular to the contour, outward, unit length.
-    pub normal: Vec3,
-    /// Distance of the edge outward along the direction, meters.
-    pub distance: f64,
-    /// Information of the edge from its colors, 1/m^2.
+    /// Information of the edge, 1/m^2.
     pub information: f64,
     /// Index of the source.
     pub source: u16,
@@ -111,21 +96,17 @@ pub(crate) struct RegionSupport {
     pub area: f64,
 }
 
-/// One elastic band: it joins the same point of a joint on the parent and on the child (K07 4.3).
+/// One end of an elastic band, which joins the same point of a joint on the parent and on the child (K07 4.3).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Band {
-    /// Parent limb.
-    pub parent: usize,
-    /// Child limb.
-    pub child: usize,
-    /// End on the parent.
-    pub on_parent: Vec3,
-    /// End on the child.
-    pub on_child: Vec3,
-    /// Artificial weight, relative to the parent's measurements.
-    pub parent_weight: f64,
-    /// Artificial weight, relative to the child's measurements.
-    pub child_weight: f64,
+pub(crate) struct BandEnd {
+    /// The limb that it pulls.
+    pub limb: usize,
+    /// The end on that limb.
+    pub x: Vec3,
+    /// The end on the other limb, the target.
+    pub p: Vec3,
+    /// Artificial weight, relative to the limb's measurements.
+    pub weight: f64,
 }
 
 /// All correspondences of one ICP step.
@@ -138,13 +119,13 @@ pub(crate) struct Correspondences {
     /// Joints of a detection.
     pub detected: Vec<DetectedPair>,
     /// Rims of limbs and the depth contour of the body.
-    pub contour: Vec<ContourPair>,
+    pub contour: Vec<EdgePair>,
     /// Contours of limbs and color edges.
-    pub regions: Vec<RegionPair>,
+    pub regions: Vec<EdgePair>,
     /// Color evidence for each limb; empty without color images.
     pub region_support: Vec<RegionSupport>,
-    /// Elastic bands.
-    pub bands: Vec<Band>,
+    /// Elastic bands, each with both of its ends.
+    pub bands: Vec<BandEnd>,
 }
 
 impl LimbMatches {
@@ -212,43 +193,34 @@ impl Correspondences {
     /// Mean squared distance of the surface points that fit, meters squared. Geman-McClure weights of `scale` suppress points
     /// that belong to something else.
     pub(crate) fn scatter(&self, scale: f64) -> Option<f64> {
-        let (mut weight, mut sum) = (0.0, 0.0);
         let inverse_square = 1.0 / (scale * scale);
-        for limb in &self.limbs {
-            let fitting = |fraction, distance| {
-                let square = f64::from(distance) * f64::from(distance);
-                let falloff = 1.0 / (1.0 + square * inverse_square);
-                let fits = f64::from(fraction) * (falloff * falloff);
-                [fits, fits * square]
-            };
-            let [fits, squares] = vectorized!(in_lanes(&limb.weight, &limb.surface.signed_distance, fitting));
-            weight += fits;
-            sum += squares;
-        }
-        (weight > 0.0).then(|| sum / weight)
+        let fitting = |fraction, distance| {
+            let square = f64::from(distance) * f64::from(distance);
+            let falloff = 1.0 / (1.0 + square * inverse_square);
+            let fits = f64::from(fraction) * (falloff * falloff);
+            [fits, fits * square]
+        };
+        let weigh = |limb: &LimbMatches| vectorized!(in_lanes(&limb.weight, &limb.surface.signed_distance, fitting));
+        weighted_mean(self.limbs.iter().map(|limb| weigh(limb).into()))
     }
 
     /// Weighted mean of the squared distances of all measured pairs (K06 III-B step 2), `None` without any.
     pub(crate) fn mean_squared_distance(&self) -> Option<f64> {
-        let (mut weight, mut sum) = (0.0, 0.0);
-        for limb in &self.limbs {
-            let (total, squares) = limb.weighed();
-            weight += total;
-            sum += squares;
-        }
-        for pair in &self.sites {
-            weight += pair.weight;
-            sum += pair.weight * (pair.x - pair.p).length_squared();
-        }
-        (weight > 0.0).then(|| sum / weight)
+        let weigh = |pair: &SitePair| (pair.weight, pair.weight * (pair.x - pair.p).length_squared());
+        weighted_mean(self.limbs.iter().map(LimbMatches::weighed).chain(self.sites.iter().map(weigh)))
     }
 
     /// Mean squared distance of the color edges, weighted by their information; `None` without any.
     pub(crate) fn mean_squared_edge(&self) -> Option<f64> {
-        let weight: f64 = self.regions.iter().map(|pair| pair.information).sum();
-        let sum: f64 = self.regions.iter().map(|pair| pair.information * pair.distance * pair.distance).sum();
-        (weight > 0.0).then(|| sum / weight)
+        let weigh = |pair: &EdgePair| (pair.information, pair.information * pair.distance * pair.distance);
+        weighted_mean(self.regions.iter().map(weigh))
     }
+}
+
+/// Mean of values, given as weights and weighted values; `None` without weight.
+fn weighted_mean(values: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
+    let (weight, sum) = values.fold((0.0, 0.0), |(weight, sum), (own, value)| (weight + own, sum + value));
+    (weight > 0.0).then(|| sum / weight)
 }
 
 #[cfg(test)]

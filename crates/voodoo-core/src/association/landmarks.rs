@@ -1,6 +1,6 @@
 //! Steps 4b-6: named sites with positions and rays, and the elastic bands (K06 IV-B.4-6, K07 4.3).
 
-use crate::association::correspondence::{Band, Correspondences, SitePair};
+use crate::association::correspondence::{BandEnd, Correspondences, SitePair};
 use crate::body::{Body, Site};
 use crate::math::{Mat3, Pose, Vec3};
 use crate::observation::frame::{Frame, PositionRelation, RayRelation};
@@ -53,14 +53,11 @@ impl Correspondences {
         for (child, parent, joint) in body.joints() {
             let fraction = joint.weight / joint.band_points().count() as f64;
             for point in joint.band_points() {
-                self.bands.push(Band {
-                    parent,
-                    child,
-                    on_parent: poses[parent] * (joint.parent_from_joint * point),
-                    on_child: poses[child] * (joint.limb_from_joint * point),
-                    parent_weight: fraction * measured[parent],
-                    child_weight: fraction * measured[child],
-                });
+                let on_parent = poses[parent] * (joint.parent_from_joint * point);
+                let on_child = poses[child] * (joint.limb_from_joint * point);
+                for (limb, x, p) in [(parent, on_parent, on_child), (child, on_child, on_parent)] {
+                    self.bands.push(BandEnd { limb, x, p, weight: fraction * measured[limb] });
+                }
             }
         }
     }
@@ -86,18 +83,15 @@ mod tests {
         all.add_bands(&body, &poses, 0.4, &mut Vec::new());
         let joints: usize =
             body.limbs().iter().flat_map(|limb| &limb.parent).map(|(_, joint)| joint.band_points().count()).sum();
-        assert_eq!(all.bands.len(), joints);
+        assert_eq!(all.bands.len(), 2 * joints);
         for limb in 0..poses.len() {
-            // Every band counts at both ends.
-            let on_parent = all.bands.iter().filter(|band| band.parent == limb).map(|band| band.parent_weight);
-            let on_child = all.bands.iter().filter(|band| band.child == limb).map(|band| band.child_weight);
-            let total: f64 = on_parent.chain(on_child).sum();
+            let total: f64 = all.bands.iter().filter(|end| end.limb == limb).map(|end| end.weight).sum();
             let measured = 0.5 * (3 * limb) as f64;
             let expected = if measured > 0.0 { 0.4 * measured } else { UNMEASURED };
             assert!((total - expected).abs() < 1e-9, "limb {limb}: {total} of {measured}");
         }
         for band in &all.bands {
-            assert!((band.on_parent - band.on_child).length() < 1e-9, "closed joints have bands of length zero");
+            assert!((band.x - band.p).length() < 1e-9, "closed joints have bands of length zero");
         }
     }
 

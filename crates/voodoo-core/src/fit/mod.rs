@@ -149,7 +149,7 @@ impl Fit {
     /// Searches for the depth-contour edges of limbs and converts them to pairs at `poses`.
     pub(crate) fn match_contour(&mut self, context: Context, poses: &[Pose]) {
         self.find_contour(context, poses);
-        self.contours.pairs(poses, &mut self.correspondences.contour);
+        self.contours.pairs(poses, context.config.depth_contour_sigma, &mut self.correspondences.contour);
     }
 
     /// Searches for every color edge separately on both sides of a limb: the pairs determine its width.
@@ -200,7 +200,7 @@ impl Fit {
         self.match_surface(context, poses, gate, anew, context.config.facing && context.config.solver.is_whole_body());
         // 4 Point-to-point relations, 5 closest points on rays.
         self.match_sites(context, poses);
-        self.contours.pairs(poses, &mut self.correspondences.contour);
+        self.contours.pairs(poses, context.config.depth_contour_sigma, &mut self.correspondences.contour);
     }
 
     fn match_sites(&mut self, context: Context, poses: &[Pose]) {

@@ -58,20 +58,16 @@ impl Motion {
         }
     }
 
-    /// Moves the working frame to the body, so that single precision is enough for points.
-    fn follow(&mut self) {
+    /// Advances to the time of a new frame: the current poses become the previous ones, and with `start` the predicted ones
+    /// become the current ones. `damping` is the fraction of the last motion that is expected to continue. Returns the time since
+    /// the last frame in units of 1/30 s, limited to the range of the motion prior.
+    pub(crate) fn advance(&mut self, body: &Body, stamp: f64, damping: f64, start: bool) -> f64 {
+        // The working frame moves to the body, so that single precision is enough for points.
         let shift = self.poses[0].translation;
         self.origin += shift;
         for pose in self.poses.iter_mut().chain(&mut self.previous) {
             *pose = shifted(pose, shift);
         }
-    }
-
-    /// Advances to the time of a new frame: the current poses become the previous ones, and with `start` the predicted ones
-    /// become the current ones. `damping` is the fraction of the last motion that is expected to continue. Returns the time since
-    /// the last frame in units of 1/30 s, limited to the range of the motion prior.
-    pub(crate) fn advance(&mut self, body: &Body, stamp: f64, damping: f64, start: bool) -> f64 {
-        self.follow();
         let step = self.stamp.map(|last| stamp - last);
         let ratio = self.ratio(stamp);
         if self.previous.len() != self.poses.len() {

@@ -138,8 +138,8 @@ impl Hypotheses {
     /// Whether the frame contradicts an arm or leg: its alternatives are tested.
     fn is_due(&mut self, at: Extremity) -> bool {
         let chain = at.chain;
-        if at.regions.is_some() {
-            let supports = &at.correspondences.region_support;
+        if at.objective.regions.is_some() {
+            let supports = &at.objective.correspondences.region_support;
             let sum =
                 |part: fn(&RegionSupport) -> f64| chain.limbs().filter_map(|limb| supports.get(limb)).map(part).sum();
             let [gained, area]: [f64; 2] = [sum(|support| support.gained), sum(|support| support.area)];
@@ -156,7 +156,7 @@ impl Hypotheses {
         proposals.iter_mut().for_each(Vec::clear);
         let [best, stretched, detected] = proposals;
         rough.begin(at);
-        let least = rough.cost(at, at.poses, f64::INFINITY) - MARGIN;
+        let least = rough.cost(at, at.objective.poses, f64::INFINITY) - MARGIN;
         let least = propose_clusters(at, rough, least, [&mut *best, stretched]);
         propose_color_directions(at, rough, least, best);
         if let Some(detection) = detection {

@@ -1,17 +1,20 @@
 //! The objective by which poses of a frame are compared: the cost of all terms.
 
 use crate::association::correspondence::Correspondences;
-use crate::fit::Context;
+use crate::fit::{Context, Fit};
 use crate::math::Pose;
 use crate::regions::ColorRegions;
 use crate::solver::{OVERLAP_SIGMA, SITE_SCALE};
-use crate::terms::{
-    DetectedJoints, Floor, Limits, PATCH, Penetration, Sites, Term, cost_of_points, free_space_cost, stance_cost,
-};
+use crate::terms::{DetectedJoints, Floor, Limits, PATCH, Penetration, Sites, Term, cost_of_points, stance_cost};
+use crate::visibility::evidence::limb_visibility;
 
 /// Decrease of the cost at which another pose is better, nats: the odds are 20 to 1. An arm or leg is tested only where that much
 /// is unexplained.
 pub(crate) const MARGIN: f64 = 3.0;
+
+/// Cost of a patch of a limb's surface that violates free space, in unexplained patches: it lies where a camera observes something
+/// behind it. Free space moves no limb: the contour in depth images moves it to the edge of what is observed.
+const VIOLATION: f64 = 0.6;
 
 /// Negative log-likelihood of poses of a body in a frame, nats.
 #[derive(Clone, Copy, Debug)]
@@ -27,7 +30,13 @@ pub(crate) struct Objective<'a> {
     pub regions: Option<&'a ColorRegions>,
 }
 
-impl Objective<'_> {
+impl<'a> Objective<'a> {
+    /// That of matched poses, with the colors where these compare poses.
+    pub(super) fn new(context: Context<'a>, fit: &'a Fit, poses: &'a [Pose], clutter: f64) -> Self {
+        let regions = context.compares_colors().then_some(&fit.regions);
+        Self { context, correspondences: &fit.correspondences, poses, clutter, regions }
+    }
+
     /// Cost of the pose of one limb but for the points.
     pub(crate) fn limb(&self, poses: &[Pose], limb: usize) -> f64 {
         let Self { context, correspondences, regions, .. } = *self;
@@ -36,7 +45,7 @@ impl Objective<'_> {
         let (body, pairs, floor) = (&model.body, &correspondences.detected, observation.floor());
         let cost = |term: &dyn Term| term.cost(body, poses, limb);
         let of_colors = |regions: &ColorRegions| -PATCH * regions.pixel_gain(context.posed(poses), limb)[0];
-        free_space_cost(observation.views, &body.limbs()[limb], &poses[limb])
+        VIOLATION * PATCH * limb_visibility(observation.views, &body.limbs()[limb], &poses[limb]).free_space
             + cost(&Sites { correspondences, information, scale: SITE_SCALE, biased: true })
             + cost(&DetectedJoints { pairs })
             + regions.map_or(0.0, of_colors)
@@ -61,7 +70,6 @@ impl Objective<'_> {
 mod tests {
     use super::*;
     use crate::body::Model;
-    use crate::fit::Fit;
     use crate::math::Vec3;
     use crate::testing::{before_wall, moved, put_board, raised, standing, turned, with_context, without_background};
 

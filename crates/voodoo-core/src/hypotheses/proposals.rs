@@ -66,10 +66,10 @@ fn end_proposals(cluster: &WeightedPoints, root: Vec3, apart: &mut Vec<f32>) -> 
 /// Proposes the directions that explain the colors best: of the upper limb among directions on a sphere, then of the lower limb
 /// at the best of these. It has to cost less than `least`.
 pub(super) fn propose_color_directions(at: Extremity, rough: &mut RoughSearch, mut least: f64, best: &mut Vec<Pose>) {
-    if at.regions.is_none() {
+    if at.objective.regions.is_none() {
         return;
     }
-    let body = &at.context.model.body;
+    let body = &at.objective.context.model.body;
     for (_, upper) in best_directions(at, &mut rough.trial) {
         let bend = at.root() + at.chain.lengths[0] * upper;
         for lower in directions() {
@@ -82,12 +82,12 @@ pub(super) fn propose_color_directions(at: Extremity, rough: &mut RoughSearch, m
 /// The directions of the upper limb of lowest cost, working frame, each with its cost, in ascending order. The current direction is
 /// one of the candidates. `trial` is working memory.
 fn best_directions(at: Extremity, trial: &mut Vec<Pose>) -> [(f64, Vec3); SWIVELS] {
-    let (chain, body, poses) = (at.chain, &at.context.model.body, at.poses);
+    let (chain, body, poses) = (at.chain, &at.objective.context.model.body, at.objective.poses);
     let mut kept = [(f64::INFINITY, Vec3::ZERO); SWIVELS];
     for upper in directions().chain([poses[chain.upper].rotation * Vec3::Z]) {
         refill(trial, poses.iter().copied());
         chain.place_between(body, trial, at.root() + upper, at.root() + 2.0 * upper);
-        let cost = at.objective().limb(trial, chain.upper);
+        let cost = at.objective.limb(trial, chain.upper);
         let place = kept.partition_point(|(other, _)| *other <= cost);
         if place < SWIVELS {
             kept[place..].rotate_right(1);
@@ -112,7 +112,7 @@ fn directions() -> impl Iterator<Item = Vec3> {
 /// Proposes an arm or leg that ends at the detected hand, wrist or ankle.
 pub(super) fn propose_detected_end(at: Extremity, detected: Detected, rough: &mut RoughSearch, best: &mut Vec<Pose>) {
     let Some(end) = detected_end(at, detected) else { return };
-    let place = end - at.context.observation.origin();
+    let place = end - at.objective.context.observation.origin();
     // The bend is searched for, because a detected elbow or knee is no more accurate than the wrist or ankle.
     rough.end_at(at, place, 2 * SWIVELS, f64::INFINITY, best);
 }
@@ -120,7 +120,7 @@ pub(super) fn propose_detected_end(at: Extremity, detected: Detected, rough: &mu
 /// Detected position of the chain's end, world frame: a joint detected on its last limb, or the detected wrist or ankle plus the
 /// current offset of the end from it.
 fn detected_end(at: Extremity, detected: Detected) -> Option<Vec3> {
-    let (chain, body, poses) = (at.chain, &at.context.model.body, at.poses);
+    let (chain, body, poses) = (at.chain, &at.objective.context.model.body, at.objective.poses);
     let last = *chain.ends.first()?;
     let (_, joint) = body.limbs()[last].parent.as_ref()?;
     if let Some(detected) = detected.on_limb(last) {

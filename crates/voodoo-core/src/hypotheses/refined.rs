@@ -90,12 +90,10 @@ impl Refined {
 
     /// Cost of matched poses, nats.
     pub(super) fn cost(&self, context: Context, fit: &mut Fit, poses: &[Pose]) -> f64 {
-        let by_colors = context.compares_colors();
-        if by_colors {
+        if context.compares_colors() {
             fit.regions.draw(context.posed(poses), |_| true);
         }
-        let regions = by_colors.then_some(&fit.regions);
-        Objective { context, correspondences: &fit.correspondences, poses, clutter: self.clutter, regions }.body()
+        Objective::new(context, fit, poses, self.clutter).body()
     }
 }
 

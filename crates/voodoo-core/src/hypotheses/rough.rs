@@ -3,12 +3,10 @@
 use std::f64::consts::TAU;
 
 use super::objective::Objective;
-use crate::association::correspondence::Correspondences;
 use crate::body::Body;
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Fit};
 use crate::math::{Points, Pose, Vec3, WeightedPoints, make_room, refill, reset};
-use crate::regions::ColorRegions;
 use crate::terms::unexplained;
 
 /// Maximum number of points for the rough cost; the time is proportional to it.
@@ -19,30 +17,19 @@ const TOLERANCE: f64 = 2.0;
 /// The arm or leg under test, and the current poses of the body.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Extremity<'a> {
-    pub(super) context: Context<'a>,
-    /// The current poses and their correspondences.
-    pub(super) correspondences: &'a Correspondences,
-    pub(super) poses: &'a [Pose],
-    /// Color regions, with the limbs drawn outside the arm or leg; `None` where points were measured.
-    pub(super) regions: Option<&'a ColorRegions>,
+    /// The current poses, and the objective by which its configurations are compared.
+    pub(super) objective: Objective<'a>,
     pub(super) chain: &'a TwoBone,
 }
 
 impl<'a> Extremity<'a> {
     pub(super) fn new(context: Context<'a>, fit: &'a Fit, poses: &'a [Pose], chain: &'a TwoBone) -> Self {
-        let regions = context.compares_colors().then_some(&fit.regions);
-        Self { context, correspondences: &fit.correspondences, poses, regions, chain }
+        Self { objective: Objective::new(context, fit, poses, 1.0), chain }
     }
 
     /// Center of its ball joint, working frame.
     pub(super) fn root(&self) -> Vec3 {
-        self.chain.root(&self.context.model.body, self.poses)
-    }
-
-    /// The objective by which its configurations are compared.
-    pub(super) fn objective(&self) -> Objective<'a> {
-        let Self { context, correspondences, poses, regions, .. } = *self;
-        Objective { context, correspondences, poses, clutter: 1.0, regions }
+        self.chain.root(&self.objective.context.model.body, self.objective.poses)
     }
 }
 
@@ -78,7 +65,7 @@ impl RoughSearch {
         sample.clear();
         sample.extend(&unexplained.points, &unexplained.weights);
         for limb in at.chain.limbs() {
-            let matches = &at.correspondences.limbs[limb];
+            let matches = &at.objective.correspondences.limbs[limb];
             for (index, weight) in matches.weight.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
                 let point = matches.measured.get(index).to_array().map(|value| value as f32);
                 sample.push(point, f64::from(*weight));
@@ -86,7 +73,7 @@ impl RoughSearch {
         }
         sample.subsample(ROUGH_SAMPLE);
         reset(others, sample.len(), f32::INFINITY);
-        let (body, poses) = (&at.context.model.body, at.poses);
+        let (body, poses) = (&at.objective.context.model.body, at.objective.poses);
         for limb in (0..poses.len()).filter(|limb| at.chain.limbs().all(|own| own != *limb)) {
             explain(body, limb, poses, &sample.points, others, distances);
         }
@@ -95,17 +82,16 @@ impl RoughSearch {
     /// Rough cost of the arm or leg at `poses`, nats. The evaluation stops when the points alone cost `least`.
     pub(super) fn cost(&mut self, at: Extremity, poses: &[Pose], least: f64) -> f64 {
         let Self { sample, others, nearest, distances, .. } = self;
-        let (chain, body) = (at.chain, &at.context.model.body);
+        let (chain, body) = (at.chain, &at.objective.context.model.body);
         nearest.clone_from(others);
         chain.limbs().for_each(|limb| explain(body, limb, poses, &sample.points, nearest, distances));
         let near = nearest.iter().zip(&sample.weights);
         let points = near.map(|(distance, weight)| weight * unexplained(f64::from(*distance) / TOLERANCE)).sum();
         // Only colors lower the cost.
-        if at.regions.is_none() && points >= least {
+        if at.objective.regions.is_none() && points >= least {
             return points;
         }
-        let objective = at.objective();
-        points + chain.limbs().map(|limb| objective.limb(poses, limb)).sum::<f64>()
+        points + chain.limbs().map(|limb| at.objective.limb(poses, limb)).sum::<f64>()
     }
 
     /// Finds the configuration of lowest cost that ends at `place`, among `swivels` bends about the line from the root to it. If
@@ -120,7 +106,7 @@ impl RoughSearch {
     ) -> f64 {
         for swivel in 0..swivels {
             let angle = TAU * swivel as f64 / swivels as f64;
-            let reach = |poses: &mut [Pose]| at.chain.reach(&at.context.model.body, poses, place, angle);
+            let reach = |poses: &mut [Pose]| at.chain.reach(&at.objective.context.model.body, poses, place, angle);
             least = self.changed(at, reach, least, best);
         }
         least
@@ -136,7 +122,7 @@ impl RoughSearch {
         best: &mut Vec<Pose>,
     ) -> f64 {
         let mut trial = std::mem::take(&mut self.trial);
-        refill(&mut trial, at.poses.iter().copied());
+        refill(&mut trial, at.objective.poses.iter().copied());
         change(&mut trial);
         let cost = self.cost(at, &trial, least);
         if cost < least {
@@ -185,7 +171,7 @@ mod tests {
                 fit.match_last(context, &poses, true);
                 let at = Extremity::new(context, &fit, &poses, arm);
                 let (mut unexplained, mut rough) = (Unexplained::default(), RoughSearch::default());
-                unexplained.collect(context.observation.candidates, at.correspondences);
+                unexplained.collect(context.observation.candidates, at.objective.correspondences);
                 unexplained.near(root, arm.stretched_length(), &mut rough.unexplained);
                 rough.begin(at);
                 let mut best = Vec::new();
@@ -206,7 +192,7 @@ mod tests {
             fit.match_last(context, &poses, true);
             let at = Extremity::new(context, &fit, &poses, &model.extremities[first_arm(&model)]);
             let mut unexplained = Unexplained::default();
-            unexplained.collect(context.observation.candidates, at.correspondences);
+            unexplained.collect(context.observation.candidates, at.objective.correspondences);
             let mut rough = RoughSearch::default();
             unexplained.near(at.root(), at.chain.stretched_length(), &mut rough.unexplained);
             rough.begin(at);

@@ -48,8 +48,8 @@ impl Clothes {
                 }
                 for (number, image) in frame.images.iter().enumerate() {
                     let camera_from_limb = image.world_from_sensor.inverse() * *pose;
-                    for row in surface_rows(&limb.shape, &camera_from_limb) {
-                        for place in row.points(ACROSS) {
+                    for (.., points) in surface_rows(&limb.shape, &camera_from_limb, ACROSS) {
+                        for place in points {
                             let Some(point) = surface(image, place, |pixel| own(number, pixel)) else { continue };
                             let world = image.world_from_sensor * point;
                             if let Some(color) = frame.colors.iter().find_map(|picture| color_at(picture, world)) {

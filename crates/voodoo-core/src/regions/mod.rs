@@ -15,7 +15,7 @@ mod posterior;
 mod scan;
 mod segment;
 
-use crate::association::correspondence::{Correspondences, RegionPair};
+use crate::association::correspondence::{Correspondences, EdgePair};
 use crate::body::Body;
 use crate::error::{TrackError, Unexpected};
 use crate::math::{Pose, Vec3, refill, reset, shifted};
@@ -206,7 +206,7 @@ impl ColorRegions {
     }
 
     /// Finds every edge on its own, for all limbs: where a limb is wider than modeled, the edges of both sides lie outward.
-    pub(crate) fn find_single_edges(&mut self, posed: Posed, pairs: &mut Vec<RegionPair>) {
+    pub(crate) fn find_single_edges(&mut self, posed: Posed, pairs: &mut Vec<EdgePair>) {
         self.find_within(posed, SINGLE_EDGES, None, pairs);
     }
 
@@ -216,7 +216,7 @@ impl ColorRegions {
         posed: Posed,
         search: EdgeSearch,
         is_requested: Option<&dyn Fn(usize) -> bool>,
-        pairs: &mut Vec<RegionPair>,
+        pairs: &mut Vec<EdgePair>,
     ) {
         let together = is_requested.is_some();
         pairs.clear();
@@ -240,7 +240,7 @@ impl ColorRegions {
                 let Some(edge) = found.filter(|edge| edge.information > 0.0) else { continue };
                 let motion = line.motion / f64::from(unit);
                 let slope = motion.length();
-                pairs.push(RegionPair {
+                pairs.push(EdgePair {
                     limb,
                     x: posed.poses[limb] * line.foot,
                     normal: working_from_camera.rotation * (motion / slope),

@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 
 use super::girth::{GIRTH_STEPS, Girth, GirthSystem, TIP_FACTORS, follow_girth, kernel, start_girth};
-use crate::association::correspondence::RegionPair;
+use crate::association::correspondence::EdgePair;
 use crate::body::{Body, Model};
 use crate::fit::{Fit, Setting};
 use crate::math::{Pose, Vec3};
@@ -25,7 +25,7 @@ const PROPORTION_SIGMA: f64 = 0.05;
 type LimbEdge = (Vec3, Vec3, f64, f64);
 
 /// Returns the edges of a limb.
-fn edges_of(pairs: &[RegionPair], limb: usize, working_from_limb: Pose) -> impl Iterator<Item = LimbEdge> {
+fn edges_of(pairs: &[EdgePair], limb: usize, working_from_limb: Pose) -> impl Iterator<Item = LimbEdge> {
     pairs.iter().filter(move |pair| pair.limb == limb).map(move |pair| {
         let foot = working_from_limb.inverse_transform_point(pair.x);
         let normal = working_from_limb.rotation.inverse() * pair.normal;

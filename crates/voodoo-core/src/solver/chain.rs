@@ -42,7 +42,13 @@ impl ChainSolver {
         let Self { normal, chain, screws, composite, h, step, .. } = self;
         chain.layout(body);
         let n = chain.freedoms;
-        list_screws(body, poses, screws);
+        // The twist of every unknown: six of the root, then those of the joints.
+        refill(screws, (0..6).map(|i| Vector6::ith(i, 1.0)));
+        for (_, parent, joint) in body.joints() {
+            let center = poses[parent] * joint.parent_from_joint.translation;
+            let (axes, count) = joint_axes(joint, &poses[parent]);
+            screws.extend(axes[..count].iter().map(|axis| screw(*axis, center)));
+        }
         // Blocks of a limb and all its descendants, leaf to root.
         refill(composite, normal.limbs.iter().map(|block| (block.h, block.g)));
         for limb in (1..composite.len()).rev() {
@@ -109,15 +115,5 @@ impl ChainSolver {
             poses[limb] = place(joint, &poses[parent], poses[limb].rotation);
             poses[limb].rotation = poses[limb].rotation.normalize();
         }
-    }
-}
-
-/// The twist of every unknown: six of the root, then those of the joints.
-fn list_screws(body: &Body, poses: &[Pose], screws: &mut Vec<Vector6<f64>>) {
-    refill(screws, (0..6).map(|i| Vector6::ith(i, 1.0)));
-    for (_, parent, joint) in body.joints() {
-        let center = poses[parent] * joint.parent_from_joint.translation;
-        let (axes, count) = joint_axes(joint, &poses[parent]);
-        screws.extend(axes[..count].iter().map(|axis| screw(*axis, center)));
     }
 }

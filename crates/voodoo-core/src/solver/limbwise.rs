@@ -15,14 +15,8 @@ pub(crate) fn solve_limbwise(correspondences: &Correspondences, poses: &mut [Pos
         for pair in correspondences.sites.iter().filter(|pair| pair.limb == limb) {
             moments.add(pair.weight, pair.x - center, pair.p - center);
         }
-        for band in &correspondences.bands {
-            // Each band appears twice, once for each limb that it joins: the end on the other limb is the target (K07 4.3).
-            if band.child == limb {
-                moments.add(band.child_weight, band.on_child - center, band.on_parent - center);
-            }
-            if band.parent == limb {
-                moments.add(band.parent_weight, band.on_parent - center, band.on_child - center);
-            }
+        for end in correspondences.bands.iter().filter(|end| end.limb == limb) {
+            moments.add(end.weight, end.x - center, end.p - center);
         }
         if let Some(motion) = moments.absolute_orientation(STAY) {
             let rotation = (motion.rotation * pose.rotation).normalize();

@@ -60,7 +60,14 @@ impl TreeSolver {
                 let on_parent = poses[parent] * (joint.parent_from_joint * end);
                 self.add_band([child, parent], strength, on_child, on_parent);
             }
-            self.add_turn([child, parent], normal);
+            // The normal equations of the joint's relative rotation `omega_child - omega_parent`.
+            let turn = &normal.joints[child];
+            self.own[child].g.fixed_rows_mut::<3>(0).add_assign(&turn.g);
+            self.own[parent].g.fixed_rows_mut::<3>(0).sub_assign(&turn.g);
+            for limb in [child, parent] {
+                self.own[limb].h.fixed_view_mut::<3, 3>(0, 0).add_assign(&turn.h);
+            }
+            self.mixed[child].fixed_view_mut::<3, 3>(0, 0).sub_assign(&turn.h);
         }
     }
 
@@ -73,17 +80,6 @@ impl TreeSolver {
             self.own[parent].add_row(strength, &-follows, d);
             self.mixed[child].ger(-strength, &moves, &follows, 1.0);
         }
-    }
-
-    /// Adds the normal equations of the joint's relative rotation `omega_child - omega_parent`.
-    fn add_turn(&mut self, [child, parent]: [usize; 2], normal: &NormalEquations) {
-        let joint = &normal.joints[child];
-        self.own[child].g.fixed_rows_mut::<3>(0).add_assign(&joint.g);
-        self.own[parent].g.fixed_rows_mut::<3>(0).sub_assign(&joint.g);
-        for limb in [child, parent] {
-            self.own[limb].h.fixed_view_mut::<3, 3>(0, 0).add_assign(&joint.h);
-        }
-        self.mixed[child].fixed_view_mut::<3, 3>(0, 0).sub_assign(&joint.h);
     }
 
     /// Eliminates every limb into its parent, leaves first, then computes the twists from the root on. Returns false, with

@@ -1,28 +1,24 @@
 //! The cost function: each term adds to the same normal equations. The list of files is the list of terms.
 
-mod contour;
 mod detected;
+mod edges;
 mod floor;
-mod free_space;
 mod limits;
 pub(crate) mod normal_equations;
 mod penetration;
 mod posture;
 mod prior;
-mod regions;
 mod sites;
 mod stance;
 mod surface;
 
-pub(crate) use contour::Contour;
 pub(crate) use detected::DetectedJoints;
+pub(crate) use edges::Edges;
 pub(crate) use floor::Floor;
-pub(crate) use free_space::free_space_cost;
 pub(crate) use limits::Limits;
 pub(crate) use penetration::Penetration;
 pub(crate) use posture::Posture;
 pub(crate) use prior::{Prior, Rest};
-pub(crate) use regions::Regions;
 pub(crate) use sites::{APART, Sites};
 pub(crate) use stance::stance_cost;
 pub(crate) use surface::{Surface, cost_of_points, unexplained};
@@ -71,12 +67,11 @@ impl Term for Measurements<'_> {
     fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations) {
         let Self { correspondences, config, scales: [scale, site_scale], biased } = *self;
         let information = 1.0 / (config.point_sigma * config.point_sigma);
-        let edge_information = 1.0 / (config.depth_contour_sigma * config.depth_contour_sigma);
         let terms: [&dyn Term; 4] = [
             &Surface { correspondences, information, tangential_weight: config.tangential_weight, scale },
             &Sites { correspondences, information, scale: site_scale, biased },
-            &Contour { pairs: &correspondences.contour, information: edge_information, scale },
-            &Regions { pairs: &correspondences.regions },
+            &Edges { pairs: &correspondences.contour, scale },
+            &Edges { pairs: &correspondences.regions, scale: f64::INFINITY },
         ];
         for term in terms {
             term.add(body, poses, normal);

@@ -1,6 +1,6 @@
 //! Results of a step.
 
-use crate::association::correspondence::Correspondences;
+use crate::association::correspondence::{Correspondences, EdgePair, SitePair};
 use crate::body::Body;
 use crate::fit::Motion;
 use crate::math::{Pose, Vec3, refill};
@@ -205,15 +205,13 @@ impl Estimate {
                 }
             }
         }
-        for pair in &correspondences.sites {
-            let report = entry(sources, pair.source);
+        let of_site = |pair: &SitePair| (pair.source, pair.base_weight, (pair.x - pair.p).length_squared());
+        let of_edge = |pair: &EdgePair| (pair.source, pair.information, pair.distance * pair.distance);
+        let pairs = correspondences.sites.iter().map(of_site).chain(correspondences.regions.iter().map(of_edge));
+        for (source, weight, square) in pairs {
+            let report = entry(sources, source);
             report.count += 1;
-            report.add(pair.base_weight, (pair.x - pair.p).length_squared());
-        }
-        for pair in &correspondences.regions {
-            let report = entry(sources, pair.source);
-            report.count += 1;
-            report.add(pair.information, pair.distance * pair.distance);
+            report.add(weight, square);
         }
         for source in sources {
             source.residual = (source.residual / source.weight).sqrt();

@@ -10,7 +10,7 @@ use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Model};
 use crate::math::{Vec3, factor, refill, reset};
 use crate::solver::{ChainSolver, SITE_SCALE};
-use crate::terms::{Regions, Sites, Term};
+use crate::terms::{Edges, Sites, Term};
 
 /// Standard deviation of every unknown of a pose that the user set, radians and meters.
 const AS_SET: f64 = 0.03;
@@ -115,7 +115,7 @@ impl EdgeFilter {
         let FittedPose { model: Model { body, extremities, .. }, poses, correspondences, config, .. } = found;
         let normal = &mut self.chain.normal;
         normal.clear(poses.len());
-        Regions { pairs: &correspondences.regions }.add(body, poses, normal);
+        Edges { pairs: &correspondences.regions, scale: f64::INFINITY }.add(body, poses, normal);
         for (limb, block) in normal.limbs.iter_mut().enumerate() {
             let support_net =
                 correspondences.region_support.get(limb).map_or(0.0, |support| support.own - support.against);
@@ -140,7 +140,7 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::*;
-    use crate::association::correspondence::{Correspondences, RegionPair, RegionSupport};
+    use crate::association::correspondence::{Correspondences, EdgePair, RegionSupport};
     use crate::config::Config;
     use crate::math::Pose;
     use crate::testing::standing;
@@ -152,7 +152,7 @@ mod tests {
         for (limb, part) in model.body.limbs().iter().enumerate() {
             for (step, normal) in (0..8).flat_map(|step| normals.iter().map(move |normal| (step, *normal))) {
                 let x = poses[limb] * (f64::from(step) / 7.0 * part.shape.length() * Vec3::Z);
-                found.regions.push(RegionPair { limb, x, normal, distance: 0.0, information: 1e4, source: 0 });
+                found.regions.push(EdgePair { limb, x, normal, distance: 0.0, information: 1e4, source: 0 });
             }
             found.region_support.push(RegionSupport { own, ..RegionSupport::default() });
         }

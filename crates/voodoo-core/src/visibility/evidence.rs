@@ -49,14 +49,14 @@ pub(crate) fn limb_visibility_in(
     let (shape, across) = (&limb.shape, [-LIMB_RIM, 0.0, LIMB_RIM]);
     let mut found = Patches::default();
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
-    for row in surface_rows(shape, &camera_from_limb) {
-        let section = row.facing.section;
+    for (_, facing, points) in surface_rows(shape, &camera_from_limb, across) {
+        let section = facing.section;
         let (a, b) = (section.a, section.b);
         // A limb viewed obliquely covers less of the image, and yields fewer points by the same factor.
-        let aslant = row.facing.across.length() / (camera_from_limb * section.center()).length();
+        let aslant = facing.across.length() / (camera_from_limb * section.center()).length();
         let patches = aslant * 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length()
             / (REFERENCE_PATCH * (ALONG_LIMB.len() * across.len()) as f64);
-        let places = row.places(view, across);
+        let places = points.map(|point| SurfacePlace::observed(view, point));
         each(places);
         for place in places {
             match place.sight() {

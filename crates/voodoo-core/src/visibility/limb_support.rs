@@ -109,13 +109,12 @@ fn support_in_view(
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
     let mut support = LimbSupport::default();
     let outer_sections = ALONG_LIMB.iter().filter(|t| **t > 0.5).count();
-    for row in surface_rows(&raycasters[limb].shape, &camera_from_limb) {
-        let t = row.t;
+    for (t, _, points) in surface_rows(&raycasters[limb].shape, &camera_from_limb, ACROSS_LIMB) {
         // The weights of all points sum to one, in the whole limb and in the outer part.
         let lever = t / (ALONG_LIMB.iter().sum::<f64>() * ACROSS_LIMB.len() as f64);
         let outer = if t > 0.5 { 1.0 / (outer_sections * ACROSS_LIMB.len()) as f64 } else { 0.0 };
         let count = |fractions: &mut [f64; 2]| *fractions = [fractions[0] + lever, fractions[1] + outer];
-        for place in row.places(view, ACROSS_LIMB) {
+        for place in points.map(|point| SurfacePlace::observed(view, point)) {
             let (sight, point) = (place.sight(), place.point);
             if sight == PatchVisibility::Unknown {
                 continue;

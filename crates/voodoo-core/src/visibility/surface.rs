@@ -29,6 +29,12 @@ pub(crate) struct SurfacePlace {
 }
 
 impl SurfacePlace {
+    /// What a camera observes at a point.
+    #[inline]
+    pub(crate) fn observed(view: &DepthView, point: Vec3) -> Self {
+        Self { point, pixel: view.at(point) }
+    }
+
     /// Classifies the point by what the camera observes.
     #[inline]
     pub(crate) fn sight(&self) -> PatchVisibility {
@@ -57,40 +63,18 @@ impl SurfacePlace {
     }
 }
 
-/// Part of a limb that faces a camera, in one section along it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct SurfaceRow<'a> {
-    /// Position along the limb as a fraction of its length, from the proximal end.
-    pub t: f64,
-    /// Cross-section there.
-    pub facing: FacingSection,
-    camera_from_limb: &'a Pose,
-}
-
-impl SurfaceRow<'_> {
-    /// Returns points across it, camera frame, meters, for offsets as fractions of the radius from the middle; see
-    /// [`FacingSection::point`].
-    #[inline]
-    pub(crate) fn points<const N: usize>(&self, across: [f64; N]) -> [Vec3; N] {
-        across.map(|s| *self.camera_from_limb * self.facing.point(s))
-    }
-
-    /// Like `points`, with what a camera observes there.
-    #[inline]
-    pub(crate) fn places<const N: usize>(&self, view: &DepthView, across: [f64; N]) -> [SurfacePlace; N] {
-        self.points(across).map(|point| SurfacePlace { point, pixel: view.at(point) })
-    }
-}
-
-/// Returns the sections at [`ALONG_LIMB`] of a limb, without those where the camera looks along the axis.
+/// Returns the sections at [`ALONG_LIMB`] of a limb, without those where the camera looks along the axis: the position along the
+/// limb as a fraction of its length, the section, and points across it, camera frame, meters, for offsets `across` as fractions of
+/// the radius from the middle; see [`FacingSection::point`].
 #[inline]
-pub(crate) fn surface_rows<'a>(
-    shape: &'a TaperedEllipticCylinder,
-    camera_from_limb: &'a Pose,
-) -> impl Iterator<Item = SurfaceRow<'a>> + 'a {
+pub(crate) fn surface_rows<const N: usize>(
+    shape: &TaperedEllipticCylinder,
+    camera_from_limb: &Pose,
+    across: [f64; N],
+) -> impl Iterator<Item = (f64, FacingSection, [Vec3; N])> {
     ALONG_LIMB.into_iter().filter_map(move |t| {
         let facing = shape.section(t).facing(camera_from_limb)?;
-        Some(SurfaceRow { t, facing, camera_from_limb })
+        Some((t, facing, across.map(|s| *camera_from_limb * facing.point(s))))
     })
 }
 

@@ -3,16 +3,14 @@
 
 use nalgebra::Vector6;
 use proptest::prelude::*;
-use voodoo_core::association::correspondence::{
-    ContourPair, Correspondences, DetectedPair, LimbMatches, RegionPair, SitePair,
-};
+use voodoo_core::association::correspondence::{Correspondences, DetectedPair, EdgePair, LimbMatches, SitePair};
 use voodoo_core::body::HumanModel;
 use voodoo_core::body::kinematics::exp;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3, rotation_vector};
 use voodoo_core::observation::frame::Ground;
 use voodoo_core::terms::normal_equations::NormalEquations;
 use voodoo_core::terms::{
-    Contour, DetectedJoints, Floor, Limits, Penetration, Posture, Prior, Regions, Rest, Sites, Surface, Term,
+    DetectedJoints, Edges, Floor, Limits, Penetration, Posture, Prior, Rest, Sites, Surface, Term,
 };
 use voodoo_core::{Body, Joint};
 
@@ -166,14 +164,14 @@ proptest! {
         let feet: Vec<Vec3> = offsets.iter().map(|offset| Vec3::new(*offset, 0.05, 0.1)).collect();
         let normal = Vec3::new(0.6, 0.0, 0.8);
         let targets: Vec<Vec3> = poses.iter().zip(&feet).zip(&offsets).map(|((pose, foot), offset)| *pose * *foot + normal * *offset).collect();
-        let edges_at = |poses: &[Pose]| -> Vec<ContourPair> {
+        let edges_at = |poses: &[Pose]| -> Vec<EdgePair> {
             (0..poses.len()).map(|limb| {
                 let x = poses[limb] * feet[limb];
-                ContourPair { limb, x, normal, distance: normal.dot(targets[limb] - x), weight: 0.7 }
+                EdgePair { limb, x, normal, distance: normal.dot(targets[limb] - x), information: 0.7, source: 0 }
             }).collect()
         };
         let add = |poses: &[Pose], system: &mut NormalEquations| {
-            Contour { pairs: &edges_at(poses), information: 1.0, scale: 0.05 }.add(&body, poses, system);
+            Edges { pairs: &edges_at(poses), scale: 0.05 }.add(&body, poses, system);
         };
         check(&body, &poses, &add, &|poses| edges_at(poses).iter().map(|edge| 0.7 * rho(edge.distance, 0.05)).sum())?;
     }
@@ -205,15 +203,15 @@ proptest! {
         let feet: Vec<Vec3> = offsets.iter().map(|offset| Vec3::new(0.06, *offset, 0.1)).collect();
         let normal = Vec3::new(0.48, -0.6, 0.64);
         let edges: Vec<f64> = poses.iter().zip(&feet).zip(&offsets).map(|((pose, foot), off)| normal.dot(*pose * *foot) + off).collect();
-        let pairs_at = |poses: &[Pose]| -> Vec<RegionPair> {
+        let pairs_at = |poses: &[Pose]| -> Vec<EdgePair> {
             (0..poses.len()).map(|limb| {
                 let x = poses[limb] * feet[limb];
                 let information = 1.0 + limb as f64;
-                RegionPair { limb, x, normal, distance: edges[limb] - normal.dot(x), information, source: 0 }
+                EdgePair { limb, x, normal, distance: edges[limb] - normal.dot(x), information, source: 0 }
             }).collect()
         };
         let add = |poses: &[Pose], system: &mut NormalEquations| {
-            Regions { pairs: &pairs_at(poses) }.add(&body, poses, system);
+            Edges { pairs: &pairs_at(poses), scale: f64::INFINITY }.add(&body, poses, system);
         };
         check(&body, &poses, &add, &|poses| pairs_at(poses).iter().map(|pair| pair.information * pair.distance.powi(2)).sum())?;
     }

@@ -43,7 +43,7 @@ impl Assessor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::association::correspondence::{Correspondences, LimbMatches, RegionPair};
+    use crate::association::correspondence::{Correspondences, EdgePair, LimbMatches};
     use crate::body::Model;
     use crate::config::Config;
     use crate::math::{Pose, Vec3};
@@ -56,7 +56,7 @@ mod tests {
             for (step, normal) in (0..8).flat_map(|step| Vec3::AXES.map(|normal| (step, normal))) {
                 let x = poses[limb] * (f64::from(step) / 7.0 * part.shape.length() * Vec3::Z);
                 let (distance, source) = (0.0, 0);
-                correspondences.regions.push(RegionPair { limb, x, normal, distance, information, source });
+                correspondences.regions.push(EdgePair { limb, x, normal, distance, information, source });
             }
             let support = RegionSupport { own: 0.6, visible: 0.6, ..RegionSupport::default() };
             correspondences.region_support.push(support);

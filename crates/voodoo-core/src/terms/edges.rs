@@ -1,26 +1,25 @@
-//! The depth contour of the body: pulls a limb's rim towards the edges observed in depth images, outward or inward.
+//! Edges in images: those of the body's contour in depth images pull a limb's rim towards them, outward or inward; those of color
+//! regions (R07 section 3) have the information of their colors.
 
 use super::{Term, surface::geman_mcclure};
-use crate::association::correspondence::ContourPair;
+use crate::association::correspondence::EdgePair;
 use crate::body::Body;
 use crate::math::Pose;
 use crate::terms::normal_equations::{NormalEquations, line};
 
 /// Distances of edges along their direction, under the Geman-McClure kernel.
 #[derive(Debug)]
-pub(crate) struct Contour<'a> {
+pub(crate) struct Edges<'a> {
     /// The pairs.
-    pub pairs: &'a [ContourPair],
-    /// Information of an edge, 1/m^2.
-    pub information: f64,
-    /// Scale of the kernel, meters.
+    pub pairs: &'a [EdgePair],
+    /// Scale of the kernel, meters; infinite for none.
     pub scale: f64,
 }
 
-impl Term for Contour<'_> {
+impl Term for Edges<'_> {
     fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut NormalEquations) {
         for pair in self.pairs {
-            let information = self.information * pair.weight * geman_mcclure(pair.distance, self.scale);
+            let information = pair.information * geman_mcclure(pair.distance, self.scale);
             let row = line(pair.x, pair.normal);
             normal.limbs[pair.limb].add_row(information, &row, -pair.distance);
         }
