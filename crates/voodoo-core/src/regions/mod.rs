@@ -225,7 +225,7 @@ impl ColorRegions {
             let Self { cameras, groups, evidence, .. } = self;
             let Some(camera) = cameras.get_mut(&picture.number).filter(|camera| camera.known) else { continue };
             let mut lines = std::mem::take(&mut camera.lines);
-            let (unit, view) = (camera.unit, ScanView { picture, camera, labels: &camera.labels, groups });
+            let (unit, view) = (camera.unit, ScanView { picture, camera, groups });
             let working_from_camera = shifted(&picture.world_from_sensor, posed.origin);
             pairs.reserve(lines.capacity());
             for line in &mut lines {

@@ -37,8 +37,6 @@ pub(super) struct ScanView<'a> {
     pub picture: &'a ColorImage<'a>,
     /// What is known of its camera.
     pub camera: &'a Learned,
-    /// The limbs that are behind and beside the line.
-    pub labels: &'a LimbLabels,
     pub groups: &'a [u16],
 }
 
@@ -167,7 +165,7 @@ impl ScanView<'_> {
         if r.abs() < BESIDE {
             return Some(line.outside);
         }
-        let (label, depth) = self.labels.at(column, row);
+        let (label, depth) = self.camera.labels.at(column, row);
         let beyond = -r - line.width;
         if r < 0.0 && beyond < 0.0 && label == line.limb {
             Some(line.outside)
