@@ -280,14 +280,14 @@ impl ColorRegions {
 
     /// Places the lines of one image.
     fn place_lines(&mut self, picture: &ColorImage, posed: Posed) {
-        let limb = camera_from_limb_at(self.stamp, picture, posed);
-        let mut camera_from_limb = std::mem::take(&mut self.camera_from_limb);
-        refill(&mut camera_from_limb, (0..posed.poses.len()).map(limb));
+        let Self { cameras, stamp, camera_from_limb, .. } = self;
+        let limb = camera_from_limb_at(*stamp, picture, posed);
+        refill(camera_from_limb, (0..posed.poses.len()).map(limb));
         let [fx, fy] = picture.camera.focal();
         let body = posed.body;
-        let Learned { unit, labels, lines, .. } = self.cameras.entry(picture.number).or_default();
+        let Learned { unit, labels, lines, .. } = cameras.entry(picture.number).or_default();
         *unit = (0.5 * (fx + fy) / FOCAL) as f32;
-        labels.draw(body, &camera_from_limb, picture.camera, CELL_BITS, |_| true);
+        labels.draw(body, camera_from_limb, picture.camera, CELL_BITS, |_| true);
         lines.clear();
         // Reserves the full capacity at once: the number of lines differs from pose to pose.
         lines.reserve(2 * MOST_LINES * camera_from_limb.len());
@@ -299,7 +299,6 @@ impl ColorRegions {
             let lines_a_side = (body.limbs()[limb].shape.length() / SPACING).round() as usize;
             viewer.add(limb, pose, lines_a_side.clamp(LEAST_LINES, MOST_LINES), lines);
         }
-        self.camera_from_limb = camera_from_limb;
     }
 
     /// Learns the colors along the lines of one image, except those of limbs with weak evidence.
