@@ -11,7 +11,7 @@ const LEAST_SIGMA: f32 = 6.0;
 const CHANGED: f32 = 0.5;
 
 /// The background colors of one camera.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct EmptyScene {
     size: [usize; 2],
     kind: Kind,
@@ -22,22 +22,17 @@ pub(super) struct EmptyScene {
 }
 
 impl EmptyScene {
-    /// The mean and variance of images of one size (height, width) and kind.
-    pub(super) fn from_pictures(pictures: &[(ColorPixels, [usize; 2])]) -> Result<Self, Unexpected> {
-        let wrong = |index: usize, found: String| {
-            let expected = "pictures of the empty scene, all of one size and kind";
-            Err(Unexpected::new(format!("images[{index}]"), expected, found))
-        };
-        let Some((first, size)) = pictures.first() else { return wrong(0, "none".into()) };
+    /// The mean and variance of images of one size (height, width) and kind; `None` without images.
+    pub(super) fn from_pictures(pictures: &[(ColorPixels, [usize; 2])]) -> Result<Option<Self>, Unexpected> {
+        let Some((first, size)) = pictures.first() else { return Ok(None) };
         let kind = Kind::new(first);
         for (index, (pixels, found)) in pictures.iter().enumerate() {
             let count = found[0].saturating_mul(found[1]);
-            if found != size || Kind::new(pixels) != kind || pixels.len() != count || count == 0 {
-                return wrong(
-                    index,
-                    format!("{:?} of {}x{} beside {}x{}", Kind::new(pixels), found[1], found[0], size[1], size[0]),
-                );
-            }
+            let valid = found == size && Kind::new(pixels) == kind && pixels.len() == count && count > 0;
+            let (what, expected) =
+                (format!("images[{index}]"), "pictures of the empty scene, all of one size and kind");
+            let found = format!("{:?} of {}x{} beside {}x{}", Kind::new(pixels), found[1], found[0], size[1], size[0]);
+            Unexpected::unless(valid, what, expected, found)?;
         }
         let count = pictures.len() as f32;
         let mut squares = 0.0_f64;
@@ -61,7 +56,7 @@ impl EmptyScene {
             Kind::Color => (SIDE as f32).ln() * 3.0 - 3.0 * width,
             Kind::Gray => -width,
         };
-        Ok(Self { size: *size, kind, mean, most: most.min(0.0), narrow: 0.5 / (sigma * sigma) })
+        Ok(Some(Self { size: *size, kind, mean, most: most.min(0.0), narrow: 0.5 / (sigma * sigma) }))
     }
 
     /// Returns an error for an image that cannot be compared with the empty scene.

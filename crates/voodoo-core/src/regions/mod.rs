@@ -153,8 +153,7 @@ impl ColorRegions {
         camera: u16,
         pictures: &[(ColorPixels, [usize; 2])],
     ) -> Result<(), TrackError> {
-        let scene = if pictures.is_empty() { None } else { Some(EmptyScene::from_pictures(pictures)?) };
-        self.cameras.entry(camera).or_default().scene = scene;
+        self.cameras.entry(camera).or_default().scene = EmptyScene::from_pictures(pictures)?;
         Ok(())
     }
 
