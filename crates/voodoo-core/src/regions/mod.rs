@@ -23,7 +23,7 @@ use crate::observation::frame::Frame;
 use crate::observation::picture::{ColorImage, ColorPixels};
 use empty_scene::EmptyScene;
 use evidence::Evidence;
-use histogram::{ColorModel, Kind};
+use histogram::ColorModel;
 use labels::LimbLabels;
 use lines::{Line, SAME_VIEW, Viewer};
 use pixel_gain::camera_from_limb_at;
@@ -176,13 +176,13 @@ impl ColorRegions {
             self.cameras.values_mut().for_each(|camera| camera.known = false);
         }
         for picture in posed.frame.colors {
-            let kind = Kind::new(&picture.pixels);
+            let gray = picture.pixels.is_gray();
             let groups = self.groups.iter().map(|group| usize::from(*group) + 1).max().unwrap_or(0);
             let camera = self.cameras.entry(picture.number).or_default();
-            if camera.known && camera.model.kind == kind {
+            if camera.known && camera.model.gray == gray {
                 continue;
             }
-            camera.model.clear(kind, groups);
+            camera.model.clear(gray, groups);
             camera.known = true;
             self.evidence.clear();
             self.place_lines(picture, posed);

@@ -7,7 +7,7 @@ use super::labels::{LimbLabels, NOTHING};
 use super::lines::{BESIDE, Line, NEARER_BY};
 use super::posterior::{MOST_REACH, edge};
 use crate::camera::Camera;
-use crate::observation::picture::{ColorImage, ColorPixels};
+use crate::observation::picture::ColorImage;
 
 /// On a limb wider than this, each edge is searched for alone, units.
 const WIDEST: f32 = 48.0;
@@ -137,7 +137,7 @@ impl ScanView<'_> {
             }
             r += every;
         }
-        if let ColorPixels::Gray(_) = self.picture.pixels {
+        if self.picture.pixels.is_gray() {
             compare_locally(self, line, [start, every], ratios);
         }
     }
