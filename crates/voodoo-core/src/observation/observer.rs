@@ -91,8 +91,9 @@ impl Observer {
         origin: Vec3,
         ownership: OwnershipMask<'a>,
     ) -> Observation<'a> {
-        let backgrounds = if self.is_masked { &self.masked } else { ownership.scene };
-        let views = DepthViews { frame, backgrounds, segmented: &self.segmented, origin };
+        let scene = if self.is_masked { &self.masked } else { ownership.scene };
+        let ownership = OwnershipMask { scene, ..ownership };
+        let views = DepthViews { frame, ownership, segmented: &self.segmented, origin };
         Observation { candidates: &self.candidates, views }
     }
 
