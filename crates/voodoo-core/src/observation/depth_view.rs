@@ -83,13 +83,8 @@ impl DepthView<'_> {
             return if self.segmented { Pixel::Background(f64::INFINITY) } else { Pixel::Unknown };
         }
         match self.background.get(index) {
-            Some(depth) if Background::contains(*depth, z as f32) => {
-                if *depth == OTHERS {
-                    Pixel::Other(z)
-                } else {
-                    Pixel::Background(z)
-                }
-            }
+            Some(&OTHERS) => Pixel::Other(z),
+            Some(depth) if Background::contains(*depth, z as f32) => Pixel::Background(z),
             _ => Pixel::Foreground(z),
         }
     }
