@@ -47,11 +47,6 @@ impl Candidates {
         self.points.len()
     }
 
-    /// True when there is none.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.points.is_empty()
-    }
-
     /// Gathers the candidates of a frame; `bounds` is the enlarged whole-body box in the working frame. Pixels of the learned
     /// backgrounds are left out.
     pub(crate) fn gather(&mut self, views: DepthViews, bounds: &Aabb, config: &Config) {
@@ -85,7 +80,7 @@ impl Candidates {
     /// A subset of approximately [`ROUGH_POINTS`] pixels with the same total weight where depth images have many; otherwise all
     /// points.
     pub(crate) fn subsampled(&self) -> &Self {
-        self.fewer.as_deref().filter(|fewer| !fewer.is_empty()).unwrap_or(self)
+        self.fewer.as_deref().filter(|fewer| !fewer.points.is_empty()).unwrap_or(self)
     }
 
     fn clear(&mut self) {

@@ -127,6 +127,6 @@ mod tests {
         observer.begin(&nothing, everything(&Backgrounds::default()), None);
         assert!(observer.silent(&nothing) && !with_frame(&pixels, 1.0, |frame| observer.silent(frame)));
         observer.clear();
-        assert!(!observer.silent(&nothing) && observer.candidates.is_empty());
+        assert!(!observer.silent(&nothing) && observer.candidates.points.is_empty());
     }
 }
