@@ -166,7 +166,7 @@ pub(crate) fn farthest(first: &[Pose], second: &[Pose]) -> f64 {
 
 /// A frame without segmented images whose working frame is the world, for queries.
 pub(crate) fn views<'a>(frame: &'a Frame<'a>, backgrounds: &'a Backgrounds) -> DepthViews<'a> {
-    DepthViews { frame, backgrounds, segmented: &[false; 8], origin: Vec3::ZERO }
+    DepthViews { frame, ownership: everything(backgrounds), segmented: &[false; 8], origin: Vec3::ZERO }
 }
 
 /// A camera that lives as long as the tests.

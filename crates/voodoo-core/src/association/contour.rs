@@ -244,7 +244,7 @@ mod tests {
     use crate::observation::depth_view::DepthViews;
     use crate::observation::frame::{DepthImage, Frame};
     use crate::shape::TaperedEllipticCylinder;
-    use crate::testing::image;
+    use crate::testing::{everything, image};
 
     const WIDTH: usize = 120;
     const FOCAL: f64 = 400.0;
@@ -267,7 +267,8 @@ mod tests {
         let images = [image(pixels, WIDTH, FOCAL)];
         let frame = Frame { images: &images, ..Frame::empty(0.0) };
         let backgrounds = Backgrounds::default();
-        let views = DepthViews { frame: &frame, backgrounds: &backgrounds, segmented: &[true], origin: Vec3::ZERO };
+        let views =
+            DepthViews { frame: &frame, ownership: everything(&backgrounds), segmented: &[true], origin: Vec3::ZERO };
         ask(views.iter().next().unwrap())
     }
 

@@ -47,7 +47,7 @@ impl<'a> Context<'a> {
     /// Whether the colors of pixels compare poses: where no point was measured near the body. Points and pixels of the same
     /// surface are not independent, and points say more.
     pub(crate) fn compares_colors(&self) -> bool {
-        !self.observation.frame().colors.is_empty() && self.observation.candidates.is_empty()
+        !self.observation.frame().colors.is_empty() && self.observation.candidates.points.is_empty()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::math::{Pose, refill};
 use crate::observation::frame::{DepthImage, Frame};
-use crate::observation::ownership::{NO_OWNER, OwnershipMask};
+use crate::observation::ownership::OwnershipMask;
 
 /// A pixel belongs to the background unless it lies more than this in front of it: meters, plus a fraction of the depth, because
 /// the noise of depth cameras grows with depth.
@@ -36,8 +36,6 @@ pub(crate) struct Background {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Backgrounds {
     pub(super) images: Vec<Background>,
-    /// For each point of each cloud, whether another person explains it; a missing entry means no.
-    others: Vec<Vec<bool>>,
 }
 
 /// Distance between two poses: meters, and radians.
@@ -83,30 +81,15 @@ impl Backgrounds {
         self.images.iter_mut().find(|background| background.fits(image))
     }
 
-    /// Whether another person explains a point of a cloud, by the indices of cloud and point.
-    pub(super) fn is_others(&self, cloud: usize, point: usize) -> bool {
-        self.others.get(cloud).is_some_and(|others| others.get(point).copied().unwrap_or(false))
-    }
-
-    /// Becomes the scene as one person sees it: with what other persons explain hidden. A frame without images keeps what is known
-    /// of the cameras.
+    /// Becomes the scene as one person sees it: with what other persons explain hidden.
     pub(super) fn mask(&mut self, frame: &Frame, ownership: OwnershipMask) {
-        let is_others = |owner: &u16| *owner != NO_OWNER && *owner != ownership.own;
-        let of_clouds = ownership.owners.get(frame.images.len()..).unwrap_or(&[]);
-        self.others.resize_with(of_clouds.len(), Vec::new);
-        for (others, owners) in self.others.iter_mut().zip(of_clouds) {
-            refill(others, owners.iter().map(is_others));
-        }
-        if frame.images.is_empty() {
-            return;
-        }
         self.images.resize_with(frame.images.len(), Background::default);
         for (number, (image, own)) in frame.images.iter().zip(&mut self.images).enumerate() {
             (own.world_from_sensor, own.width) = (image.world_from_sensor, image.camera.width());
             refill(&mut own.depth, ownership.scene.depth(image).iter().copied());
             own.depth.resize(image.pixels.len(), 0.0);
             for (depth, owner) in own.depth.iter_mut().zip(ownership.owners(number)) {
-                *depth = if is_others(owner) { OTHERS } else { *depth };
+                *depth = if ownership.is_others(*owner) { OTHERS } else { *depth };
             }
         }
     }

@@ -20,20 +20,16 @@ impl Backgrounds {
         let leap = |background: &Background| {
             let (meters, radians) = pose_difference(&background.world_from_sensor, &image.world_from_sensor);
             let is_near = background.is_sized_like(image) && meters <= LEAPS.0 && radians <= LEAPS.1;
-            is_near.then_some(meters / LEAPS.0 + radians / LEAPS.1)
+            if is_near { meters / LEAPS.0 + radians / LEAPS.1 } else { f64::INFINITY }
         };
-        let left = (0..self.images.len()).filter(|index| gone(&self.images[*index]));
-        let nearest = left
-            .clone()
-            .filter_map(|index| Some((leap(&self.images[index])?, index)))
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(_, index)| index);
-        let index = nearest.or(left.clone().next()).unwrap_or(self.images.len());
+        let left = self.images.iter().enumerate().filter(|(_, background)| gone(background));
+        let nearest = left.map(|(index, background)| (index, leap(background))).min_by(|a, b| a.1.total_cmp(&b.1));
+        let (index, leap) = nearest.unwrap_or((self.images.len(), f64::INFINITY));
         if index == self.images.len() {
             self.images.push(Background::default());
         }
         let background = &mut self.images[index];
-        if nearest.is_some() {
+        if leap.is_finite() {
             background.move_to(image);
         } else {
             reset(&mut background.depth, image.pixels.len(), 0.0);

@@ -47,15 +47,10 @@ impl Candidates {
         self.points.len()
     }
 
-    /// True when there is none.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.points.is_empty()
-    }
-
     /// Gathers the candidates of a frame; `bounds` is the enlarged whole-body box in the working frame. Pixels of the learned
     /// backgrounds are left out.
     pub(crate) fn gather(&mut self, views: DepthViews, bounds: &Aabb, config: &Config) {
-        let DepthViews { frame, backgrounds, origin, .. } = views;
+        let DepthViews { frame, ownership, origin, .. } = views;
         self.clear();
         let (up, floor) = match frame.ground {
             Some(ground) => (ground.normal, ground.relative_to(origin).offset + config.ground_clearance),
@@ -71,7 +66,9 @@ impl Candidates {
         }
         for (number, cloud) in frame.clouds.iter().enumerate() {
             let first = self.points.len();
-            self.gather_cloud(cloud, origin, &gate, |point| backgrounds.is_others(number, point));
+            let owners = ownership.owners(frame.images.len() + number);
+            let is_others = |point: usize| owners.get(point).is_some_and(|owner| ownership.is_others(*owner));
+            self.gather_cloud(cloud, origin, &gate, is_others);
             if !matches!(cloud.scope, Scope::Limb(_)) {
                 self.leave_out(first, frame.excluded, origin);
             }
@@ -83,7 +80,7 @@ impl Candidates {
     /// A subset of approximately [`ROUGH_POINTS`] pixels with the same total weight where depth images have many; otherwise all
     /// points.
     pub(crate) fn subsampled(&self) -> &Self {
-        self.fewer.as_deref().filter(|fewer| !fewer.is_empty()).unwrap_or(self)
+        self.fewer.as_deref().filter(|fewer| !fewer.points.is_empty()).unwrap_or(self)
     }
 
     fn clear(&mut self) {
@@ -225,7 +222,7 @@ mod tests {
     use crate::math::Quat;
     use crate::observation::background::{Background, Backgrounds};
     use crate::observation::frame::{Frame, Ground, PointSlice};
-    use crate::testing::{image, views};
+    use crate::testing::{everything, image, views};
 
     #[test]
     fn candidates_are_the_returns_in_the_box_above_the_floor_and_before_the_scene() {
@@ -248,7 +245,7 @@ mod tests {
         let bounds = Aabb::new(Vec3::new(-0.4, -0.3, -0.6), Vec3::new(0.4, 0.5, 0.4));
         let config = Config { max_points: 1_000_000, ..Config::default() };
         let mut found = Candidates::default();
-        let views = DepthViews { frame: &frame, backgrounds: &backgrounds, segmented: &[false], origin };
+        let views = DepthViews { frame: &frame, ownership: everything(&backgrounds), segmented: &[false], origin };
         found.gather(views, &bounds, &config);
         // The reference: one pixel after the other, in double precision.
         let expected: Vec<Vec3> = (0..pixels.len())

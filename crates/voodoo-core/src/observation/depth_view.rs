@@ -2,8 +2,9 @@
 
 use crate::camera::NEAREST_RETURN;
 use crate::math::{Pose, Vec3, refill, shifted};
-use crate::observation::background::{Background, Backgrounds, OTHERS};
+use crate::observation::background::{Background, OTHERS};
 use crate::observation::frame::{DepthImage, Frame};
+use crate::observation::ownership::OwnershipMask;
 
 /// A depth image that can be queried by position.
 #[derive(Clone, Copy, Debug)]
@@ -41,8 +42,8 @@ const SEGMENTED_STEP: usize = 97;
 pub(crate) struct DepthViews<'a> {
     /// The frame.
     pub frame: &'a Frame<'a>,
-    /// The learned backgrounds.
-    pub backgrounds: &'a Backgrounds,
+    /// The scene as the body's person sees it, and which pixels and points others explain.
+    pub ownership: OwnershipMask<'a>,
     /// Whether the body was segmented in each image, as [`find_segmented`] found.
     pub segmented: &'a [bool],
     /// The working frame's origin in the world.
@@ -55,7 +56,7 @@ impl<'a> DepthViews<'a> {
         let images = self.frame.images.iter().zip(self.segmented);
         images.map(move |(image, segmented)| DepthView {
             image,
-            background: self.backgrounds.depth(image),
+            background: self.ownership.scene.depth(image),
             working_from_camera: shifted(&image.world_from_sensor, self.origin),
             segmented: *segmented,
         })
@@ -82,13 +83,8 @@ impl DepthView<'_> {
             return if self.segmented { Pixel::Background(f64::INFINITY) } else { Pixel::Unknown };
         }
         match self.background.get(index) {
-            Some(depth) if Background::contains(*depth, z as f32) => {
-                if *depth == OTHERS {
-                    Pixel::Other(z)
-                } else {
-                    Pixel::Background(z)
-                }
-            }
+            Some(&OTHERS) => Pixel::Other(z),
+            Some(depth) if Background::contains(*depth, z as f32) => Pixel::Background(z),
             _ => Pixel::Foreground(z),
         }
     }
@@ -161,7 +157,8 @@ pub(crate) fn find_segmented(frame: &Frame, found: &mut Vec<bool>) {
 mod tests {
     use super::*;
     use crate::camera::{Camera, Lens};
-    use crate::testing::image;
+    use crate::observation::background::Backgrounds;
+    use crate::testing::{everything, image, views};
 
     /// Every pixel of this image has a different depth, meters.
     fn distinct(count: usize) -> Vec<f32> {
@@ -223,8 +220,12 @@ mod tests {
         let backgrounds = Backgrounds::default();
         let empty = image.back_project(1000, 2.0);
         for (segmented, expected) in [([true], Pixel::Background(f64::INFINITY)), ([false], Pixel::Unknown)] {
-            let views =
-                DepthViews { frame: &frame, backgrounds: &backgrounds, segmented: &segmented, origin: Vec3::ZERO };
+            let views = DepthViews {
+                frame: &frame,
+                ownership: everything(&backgrounds),
+                segmented: &segmented,
+                origin: Vec3::ZERO,
+            };
             assert!(views.iter().all(|view| view.at(empty) == expected));
         }
     }
@@ -239,7 +240,7 @@ mod tests {
         pixels[55] = 2.0;
         let images = [image(&pixels, 12, 10.0)];
         let frame = Frame { images: &images, ..Frame::empty(0.1) };
-        let views = DepthViews { frame: &frame, backgrounds: &backgrounds, segmented: &[false], origin: Vec3::ZERO };
+        let views = views(&frame, &backgrounds);
         let view = views.iter().next().unwrap();
         assert_eq!(view.at(images[0].back_project(54, 1.0)), Pixel::Background(3.0));
         assert_eq!(view.at(images[0].back_project(55, 1.0)), Pixel::Foreground(2.0));

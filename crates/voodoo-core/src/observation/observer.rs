@@ -91,8 +91,9 @@ impl Observer {
         origin: Vec3,
         ownership: OwnershipMask<'a>,
     ) -> Observation<'a> {
-        let backgrounds = if self.is_masked { &self.masked } else { ownership.scene };
-        let views = DepthViews { frame, backgrounds, segmented: &self.segmented, origin };
+        let scene = if self.is_masked { &self.masked } else { ownership.scene };
+        let ownership = OwnershipMask { scene, ..ownership };
+        let views = DepthViews { frame, ownership, segmented: &self.segmented, origin };
         Observation { candidates: &self.candidates, views }
     }
 
@@ -126,6 +127,6 @@ mod tests {
         observer.begin(&nothing, everything(&Backgrounds::default()), None);
         assert!(observer.silent(&nothing) && !with_frame(&pixels, 1.0, |frame| observer.silent(frame)));
         observer.clear();
-        assert!(!observer.silent(&nothing) && observer.candidates.is_empty());
+        assert!(!observer.silent(&nothing) && observer.candidates.points.is_empty());
     }
 }

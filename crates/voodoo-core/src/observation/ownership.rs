@@ -20,8 +20,13 @@ pub(crate) struct OwnershipMask<'a> {
 }
 
 impl<'a> OwnershipMask<'a> {
-    /// The owners of the pixels of an image.
-    pub(crate) fn owners(&self, image: usize) -> &'a [u16] {
-        self.owners.get(image).map_or(&[], Vec::as_slice)
+    /// The owners of the pixels of an image, or of the points of a cloud, which are numbered after the images.
+    pub(crate) fn owners(&self, source: usize) -> &'a [u16] {
+        self.owners.get(source).map_or(&[], Vec::as_slice)
+    }
+
+    /// Whether this owner is another person.
+    pub(crate) fn is_others(&self, owner: u16) -> bool {
+        owner != NO_OWNER && owner != self.own
     }
 }

@@ -28,6 +28,12 @@ impl ColorPixels<'_> {
         }
     }
 
+    /// Whether the image is grayscale.
+    #[inline(always)]
+    pub(crate) fn is_gray(&self) -> bool {
+        matches!(self, Self::Gray(_))
+    }
+
     /// The color of a pixel.
     #[inline(always)]
     pub fn get(&self, index: usize) -> [u8; 3] {

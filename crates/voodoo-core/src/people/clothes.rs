@@ -1,7 +1,7 @@
 //! Color histograms of a person's clothes, above and below the waist.
 
 use crate::body::{Body, LimbRole};
-use crate::math::{Pose, Vec3, reset};
+use crate::math::{Pose, Vec3};
 use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::picture::ColorImage;
 use crate::visibility::surface::surface_rows;
@@ -31,16 +31,14 @@ struct ClothesHistogram {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Clothes {
     worn: [ClothesHistogram; 2],
-    counts: Vec<f32>,
 }
 
 impl Clothes {
     /// Updates with the colors of a posed body (world frame). `own` returns for the number of a depth image and a pixel whether
     /// the pixel may show this body.
     pub(super) fn observe(&mut self, frame: &Frame, body: &Body, poses: &[Pose], own: impl Fn(usize, usize) -> bool) {
-        let Self { worn, counts } = self;
-        for (half, histogram) in worn.iter_mut().enumerate() {
-            reset(counts, BINS.iter().product(), 0.0);
+        for (half, histogram) in self.worn.iter_mut().enumerate() {
+            let mut counts = vec![0.0; BINS.iter().product()];
             let mut places = 0;
             for (index, (limb, pose)) in body.limbs().iter().zip(poses).enumerate() {
                 if body.roles().limb(index).and_then(half_of) != Some(half) {
@@ -53,7 +51,7 @@ impl Clothes {
                             let Some(point) = surface(image, place, |pixel| own(number, pixel)) else { continue };
                             let world = image.world_from_sensor * point;
                             if let Some(color) = frame.colors.iter().find_map(|picture| color_at(picture, world)) {
-                                add(counts, color);
+                                add(&mut counts, color);
                                 places += 1;
                             }
                         }
@@ -61,7 +59,7 @@ impl Clothes {
                 }
             }
             if places >= FEWEST_PLACES {
-                histogram.update(counts, places as f32);
+                histogram.update(&counts, places as f32);
             }
         }
     }

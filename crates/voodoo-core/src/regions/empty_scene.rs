@@ -1,6 +1,6 @@
 //! The empty scene of a camera: a background color per pixel, and the likelihood of another color there.
 
-use super::histogram::{Kind, SIDE};
+use super::histogram::SIDE;
 use crate::error::Unexpected;
 use crate::observation::picture::{ColorImage, ColorPixels};
 
@@ -11,10 +11,11 @@ const LEAST_SIGMA: f32 = 6.0;
 const CHANGED: f32 = 0.5;
 
 /// The background colors of one camera.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct EmptyScene {
     size: [usize; 2],
-    kind: Kind,
+    /// Whether the images are grayscale.
+    gray: bool,
     mean: Vec<[u8; 3]>,
     /// Logarithm of the greatest probability of a bin, and one over twice the variance of a channel.
     most: f32,
@@ -22,22 +23,18 @@ pub(super) struct EmptyScene {
 }
 
 impl EmptyScene {
-    /// The mean and variance of images of one size (height, width) and kind.
-    pub(super) fn from_pictures(pictures: &[(ColorPixels, [usize; 2])]) -> Result<Self, Unexpected> {
-        let wrong = |index: usize, found: String| {
-            let expected = "pictures of the empty scene, all of one size and kind";
-            Err(Unexpected::new(format!("images[{index}]"), expected, found))
-        };
-        let Some((first, size)) = pictures.first() else { return wrong(0, "none".into()) };
-        let kind = Kind::new(first);
+    /// The mean and variance of images of one size (height, width) and kind; `None` without images.
+    pub(super) fn from_pictures(pictures: &[(ColorPixels, [usize; 2])]) -> Result<Option<Self>, Unexpected> {
+        let Some((first, size)) = pictures.first() else { return Ok(None) };
+        let gray = first.is_gray();
         for (index, (pixels, found)) in pictures.iter().enumerate() {
             let count = found[0].saturating_mul(found[1]);
-            if found != size || Kind::new(pixels) != kind || pixels.len() != count || count == 0 {
-                return wrong(
-                    index,
-                    format!("{:?} of {}x{} beside {}x{}", Kind::new(pixels), found[1], found[0], size[1], size[0]),
-                );
-            }
+            let valid = found == size && pixels.is_gray() == gray && pixels.len() == count && count > 0;
+            let (what, expected) =
+                (format!("images[{index}]"), "pictures of the empty scene, all of one size and kind");
+            let kind = if pixels.is_gray() { "grayscale" } else { "color" };
+            let found = format!("{kind} of {}x{} beside {}x{}", found[1], found[0], size[1], size[0]);
+            Unexpected::unless(valid, what, expected, found)?;
         }
         let count = pictures.len() as f32;
         let mut squares = 0.0_f64;
@@ -57,17 +54,14 @@ impl EmptyScene {
         let variance = (squares / (3.0 * mean.len() as f64 * f64::from((count - 1.0).max(1.0)))) as f32;
         let sigma = variance.sqrt().max(LEAST_SIGMA);
         let width = (std::f32::consts::TAU.sqrt() * sigma).ln();
-        let most = match kind {
-            Kind::Color => (SIDE as f32).ln() * 3.0 - 3.0 * width,
-            Kind::Gray => -width,
-        };
-        Ok(Self { size: *size, kind, mean, most: most.min(0.0), narrow: 0.5 / (sigma * sigma) })
+        let most = if gray { -width } else { (SIDE as f32).ln() * 3.0 - 3.0 * width };
+        Ok(Some(Self { size: *size, gray, mean, most: most.min(0.0), narrow: 0.5 / (sigma * sigma) }))
     }
 
     /// Returns an error for an image that cannot be compared with the empty scene.
     pub(super) fn check(&self, picture: &ColorImage, index: usize) -> Result<(), Unexpected> {
         let [height, width] = [picture.camera.height(), picture.camera.width()];
-        let valid = self.size == [height, width] && self.kind == Kind::new(&picture.pixels);
+        let valid = self.size == [height, width] && self.gray == picture.pixels.is_gray();
         let (what, expected) = (format_args!("color[{index}].image"), "a picture like those of the empty scene");
         let found = format_args!("{width}x{height} beside {}x{}", self.size[1], self.size[0]);
         Unexpected::unless(valid, what, expected, found)
@@ -78,10 +72,8 @@ impl EmptyScene {
     #[inline]
     pub(super) fn log(&self, index: usize, pixel: [u8; 3], around: f32) -> f32 {
         let (here, value) = (self.mean[index].map(f32::from), pixel.map(f32::from));
-        let square: f32 = match self.kind {
-            Kind::Color => (0..3).map(|channel| (value[channel] - here[channel]).powi(2)).sum(),
-            Kind::Gray => (value[0] - here[0]).powi(2),
-        };
+        let square = |channel: usize| (value[channel] - here[channel]).powi(2);
+        let square: f32 = if self.gray { square(0) } else { (0..3).map(square).sum() };
         (self.most - self.narrow * square).max(around) + CHANGED.ln()
     }
 }

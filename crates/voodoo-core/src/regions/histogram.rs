@@ -21,28 +21,9 @@ const RATES: [f32; 2] = [0.19, 0.36];
 /// Bound of the absolute log ratio: a color that was never observed before is weak evidence.
 pub(super) const MOST_RATIO: f32 = 2.0;
 
-/// Kind of an image, which determines its bins.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Kind {
-    #[default]
-    Color,
-    Gray,
-}
-
-impl Kind {
-    pub(super) fn new(pixels: &ColorPixels) -> Self {
-        match pixels {
-            ColorPixels::Color(_) => Self::Color,
-            ColorPixels::Gray(_) => Self::Gray,
-        }
-    }
-
-    pub(super) fn bins(self) -> usize {
-        match self {
-            Self::Color => SIDE * SIDE * SIDE,
-            Self::Gray => 256,
-        }
-    }
+/// Number of bins for grayscale and for color images.
+fn bins(gray: bool) -> usize {
+    if gray { 256 } else { SIDE * SIDE * SIDE }
 }
 
 /// The bin of a pixel.
@@ -75,8 +56,8 @@ pub(super) struct ColorHistogram {
 }
 
 impl ColorHistogram {
-    pub(super) fn clear(&mut self, kind: Kind) {
-        let bins = kind.bins();
+    pub(super) fn clear(&mut self, gray: bool) {
+        let bins = bins(gray);
         for values in [&mut self.frequency, &mut self.counts] {
             reset(values, bins, 0.0);
         }
@@ -93,13 +74,14 @@ impl ColorHistogram {
 
     /// Updates the histogram with the counts, if there are any: the first time it takes them over, later it mixes them in at
     /// `rate`. Resets the counts.
-    pub(super) fn learn(&mut self, kind: Kind, rate: f32, room: &mut Vec<f32>) {
+    pub(super) fn learn(&mut self, gray: bool, rate: f32, room: &mut Vec<f32>) {
         if self.counted == 0.0 {
             return;
         }
-        match kind {
-            Kind::Color => smooth_color(&mut self.counts, room),
-            Kind::Gray => (0..GRAY_PASSES).for_each(|_| smooth(&mut self.counts, room, 1, kind.bins())),
+        if gray {
+            (0..GRAY_PASSES).for_each(|_| smooth(&mut self.counts, room, 1, bins(gray)));
+        } else {
+            smooth_color(&mut self.counts, room);
         }
         let rate = if self.known { rate } else { 1.0 };
         let (keep, new) = (1.0 - rate, rate / self.counted);
@@ -120,7 +102,8 @@ impl ColorHistogram {
 /// Colors by group of limbs: the left and the right limb of a pair share one model.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ColorModel {
-    pub kind: Kind,
+    /// Whether the images are grayscale.
+    pub gray: bool,
     pub limbs: Vec<ColorHistogram>,
     pub around: Vec<ColorHistogram>,
     room: Vec<f32>,
@@ -128,19 +111,19 @@ pub(super) struct ColorModel {
 
 impl ColorModel {
     /// Clears all colors.
-    pub(super) fn clear(&mut self, kind: Kind, groups: usize) {
-        self.kind = kind;
+    pub(super) fn clear(&mut self, gray: bool, groups: usize) {
+        self.gray = gray;
         for histograms in [&mut self.limbs, &mut self.around] {
             histograms.resize_with(groups, ColorHistogram::default);
-            histograms.iter_mut().for_each(|histogram| histogram.clear(kind));
+            histograms.iter_mut().for_each(|histogram| histogram.clear(gray));
         }
     }
 
     /// Updates the models with the counted colors.
     pub(super) fn learn(&mut self) {
-        let Self { kind, limbs, around, room } = self;
+        let Self { gray, limbs, around, room } = self;
         for (histograms, rate) in [limbs, around].into_iter().zip(RATES) {
-            histograms.iter_mut().for_each(|histogram| histogram.learn(*kind, rate, room));
+            histograms.iter_mut().for_each(|histogram| histogram.learn(*gray, rate, room));
         }
     }
 

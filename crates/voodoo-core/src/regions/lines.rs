@@ -73,15 +73,12 @@ impl Viewer<'_> {
                 let [fx, fy] = self.camera.focal();
                 self.line(index, camera_from_limb, point, [normal.x / fx, normal.y / fy])
             });
-            let [Some(mut first), Some(mut second)] = sides else { continue };
+            let [Some(first), Some(second)] = sides else { continue };
             let apart = [second.place[0] - first.place[0], second.place[1] - first.place[1]];
-            let (of_first, of_second) = (first, second);
-            for (line, other) in [(&mut first, of_second), (&mut second, of_first)] {
-                let across = apart[0] * line.normal[0] + apart[1] * line.normal[1];
-                line.width = across.abs() / self.unit;
-                (line.opposite, line.both) = (other.outside, line.clear && other.clear);
+            for (line, other) in [(first, second), (second, first)] {
+                let width = (apart[0] * line.normal[0] + apart[1] * line.normal[1]).abs() / self.unit;
+                lines.push(Line { width, opposite: other.outside, both: line.clear && other.clear, ..line });
             }
-            lines.extend([first, second]);
         }
         for (distal, _) in [false, true].into_iter().zip(limb.match_caps).filter(|(_, free)| *free) {
             self.add_rim(index, camera_from_limb, distal, lines);
@@ -140,15 +137,13 @@ impl Viewer<'_> {
     /// What borders a limb at a pixel of its contour: the limb outside, the depth inside, and whether the contour is clear.
     /// `None` outside of the image.
     fn border(&self, limb: usize, place: [f32; 2], normal: [f32; 2]) -> Option<(u16, f32, bool)> {
-        let inside = |u: f32, v: f32| {
-            (u >= 0.0 && v >= 0.0 && u < self.camera.width() as f32 && v < self.camera.height() as f32)
-                .then_some((u, v))
+        let at = |outward: f32| {
+            let [u, v] = [0, 1].map(|axis| place[axis] + outward * normal[axis]);
+            let inside = u >= 0.0 && v >= 0.0 && u < self.camera.width() as f32 && v < self.camera.height() as f32;
+            inside.then(|| self.labels.at(u as usize, v as usize))
         };
         let beside = BESIDE * self.unit;
-        let (u, v) = inside(place[0] - beside * normal[0], place[1] - beside * normal[1])?;
-        let (own, depth) = self.labels.at(u as usize, v as usize);
-        let (u, v) = inside(place[0] + beside * normal[0], place[1] + beside * normal[1])?;
-        let (outside, behind) = self.labels.at(u as usize, v as usize);
+        let ((own, depth), (outside, behind)) = (at(-beside)?, at(beside)?);
         let clear = usize::from(own) == limb
             && usize::from(outside) != limb
             && (outside == NOTHING || {

@@ -23,7 +23,7 @@ use crate::observation::frame::Frame;
 use crate::observation::picture::{ColorImage, ColorPixels};
 use empty_scene::EmptyScene;
 use evidence::Evidence;
-use histogram::{ColorModel, Kind};
+use histogram::ColorModel;
 use labels::LimbLabels;
 use lines::{Line, SAME_VIEW, Viewer};
 use pixel_gain::camera_from_limb_at;
@@ -153,8 +153,7 @@ impl ColorRegions {
         camera: u16,
         pictures: &[(ColorPixels, [usize; 2])],
     ) -> Result<(), TrackError> {
-        let scene = if pictures.is_empty() { None } else { Some(EmptyScene::from_pictures(pictures)?) };
-        self.cameras.entry(camera).or_default().scene = scene;
+        self.cameras.entry(camera).or_default().scene = EmptyScene::from_pictures(pictures)?;
         Ok(())
     }
 
@@ -177,13 +176,13 @@ impl ColorRegions {
             self.cameras.values_mut().for_each(|camera| camera.known = false);
         }
         for picture in posed.frame.colors {
-            let kind = Kind::new(&picture.pixels);
+            let gray = picture.pixels.is_gray();
             let groups = self.groups.iter().map(|group| usize::from(*group) + 1).max().unwrap_or(0);
             let camera = self.cameras.entry(picture.number).or_default();
-            if camera.known && camera.model.kind == kind {
+            if camera.known && camera.model.gray == gray {
                 continue;
             }
-            camera.model.clear(kind, groups);
+            camera.model.clear(gray, groups);
             camera.known = true;
             self.evidence.clear();
             self.place_lines(picture, posed);
@@ -225,7 +224,7 @@ impl ColorRegions {
             let Self { cameras, groups, evidence, .. } = self;
             let Some(camera) = cameras.get_mut(&picture.number).filter(|camera| camera.known) else { continue };
             let mut lines = std::mem::take(&mut camera.lines);
-            let (unit, view) = (camera.unit, ScanView { picture, camera, labels: &camera.labels, groups });
+            let (unit, view) = (camera.unit, ScanView { picture, camera, groups });
             let working_from_camera = shifted(&picture.world_from_sensor, posed.origin);
             pairs.reserve(lines.capacity());
             for line in &mut lines {
@@ -280,14 +279,14 @@ impl ColorRegions {
 
     /// Places the lines of one image.
     fn place_lines(&mut self, picture: &ColorImage, posed: Posed) {
-        let limb = camera_from_limb_at(self.stamp, picture, posed);
-        let mut camera_from_limb = std::mem::take(&mut self.camera_from_limb);
-        refill(&mut camera_from_limb, (0..posed.poses.len()).map(limb));
+        let Self { cameras, stamp, camera_from_limb, .. } = self;
+        let limb = camera_from_limb_at(*stamp, picture, posed);
+        refill(camera_from_limb, (0..posed.poses.len()).map(limb));
         let [fx, fy] = picture.camera.focal();
         let body = posed.body;
-        let Learned { unit, labels, lines, .. } = self.cameras.entry(picture.number).or_default();
+        let Learned { unit, labels, lines, .. } = cameras.entry(picture.number).or_default();
         *unit = (0.5 * (fx + fy) / FOCAL) as f32;
-        labels.draw(body, &camera_from_limb, picture.camera, CELL_BITS, |_| true);
+        labels.draw(body, camera_from_limb, picture.camera, CELL_BITS, |_| true);
         lines.clear();
         // Reserves the full capacity at once: the number of lines differs from pose to pose.
         lines.reserve(2 * MOST_LINES * camera_from_limb.len());
@@ -299,7 +298,6 @@ impl ColorRegions {
             let lines_a_side = (body.limbs()[limb].shape.length() / SPACING).round() as usize;
             viewer.add(limb, pose, lines_a_side.clamp(LEAST_LINES, MOST_LINES), lines);
         }
-        self.camera_from_limb = camera_from_limb;
     }
 
     /// Learns the colors along the lines of one image, except those of limbs with weak evidence.

@@ -56,7 +56,7 @@ impl ColorRegions {
         for (picture, labels) in posed.frame.colors.iter().zip(&self.backdrop) {
             let known = self.cameras.get(&picture.number);
             let Some(camera) = known.filter(|camera| camera.known && camera.model.knows(group)) else { continue };
-            let view = ScanView { picture, camera, labels, groups: &self.groups };
+            let view = ScanView { picture, camera, groups: &self.groups };
             let camera_from_limb = camera_from_limb_at(self.stamp, picture, posed)(limb);
             places(shape, &camera_from_limb, picture.camera, |[u, v], depth, area| {
                 all += area;

@@ -7,7 +7,7 @@ use super::labels::{LimbLabels, NOTHING};
 use super::lines::{BESIDE, Line, NEARER_BY};
 use super::posterior::{MOST_REACH, edge};
 use crate::camera::Camera;
-use crate::observation::picture::{ColorImage, ColorPixels};
+use crate::observation::picture::ColorImage;
 
 /// On a limb wider than this, each edge is searched for alone, units.
 const WIDEST: f32 = 48.0;
@@ -37,8 +37,6 @@ pub(super) struct ScanView<'a> {
     pub picture: &'a ColorImage<'a>,
     /// What is known of its camera.
     pub camera: &'a Learned,
-    /// The limbs that are behind and beside the line.
-    pub labels: &'a LimbLabels,
     pub groups: &'a [u16],
 }
 
@@ -82,29 +80,16 @@ pub(super) fn edge_on(view: &ScanView, line: &Line, search: EdgeSearch, together
     Some(LineEdge { mean, information, beside })
 }
 
-/// Distribution of brightness beside the contour: a Gaussian (R07).
-#[derive(Clone, Copy, Debug, Default)]
-struct Local {
-    count: f32,
-    sum: f32,
-    squares: f32,
-}
-
-impl Local {
-    fn fit(values: impl Iterator<Item = f32>) -> Self {
-        values.fold(Self::default(), |all, value| Self {
-            count: all.count + 1.0,
-            sum: all.sum + value,
-            squares: all.squares + value * value,
-        })
+/// Returns the logarithm of the density of brightness beside the contour, up to a constant: of a Gaussian (R07) that is fitted to
+/// these values. `None` if there are too few.
+fn log_density(values: impl Iterator<Item = f32>) -> Option<impl Fn(f32) -> f32> {
+    let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
+    for value in values {
+        (count, sum, squares) = (count + 1.0, sum + value, squares + value * value);
     }
-
-    /// Logarithm of the density at a value, up to a constant.
-    fn log(&self, value: f32) -> f32 {
-        let mean = self.sum / self.count;
-        let variance = (self.squares / self.count - mean * mean).max(LEAST_SPREAD * LEAST_SPREAD);
-        -0.5 * ((value - mean).powi(2) / variance + variance.ln())
-    }
+    let mean = sum / count;
+    let variance = (squares / count - mean * mean).max(LEAST_SPREAD * LEAST_SPREAD);
+    (count >= 3.0).then_some(move |value: f32| -0.5 * ((value - mean).powi(2) / variance + variance.ln()))
 }
 
 /// Gray values alone hardly identify a whole limb: each ratio is averaged with the log ratio of the local brightness beside the
@@ -114,17 +99,14 @@ fn compare_locally(view: &ScanView, line: &Line, [start, every]: [f32; 2], ratio
     let side = |from: f32, to: f32| {
         let steps = (to - from).max(0.0) as usize;
         let walk = Walk::new(picture, line, from * unit, unit).take(steps);
-        Local::fit(walk.flatten().map(|(column, row)| brightness(picture, column, row)))
+        log_density(walk.flatten().map(|(column, row)| brightness(picture, column, row)))
     };
-    let (inside, outside) = (side(-line.width.min(LOCAL), -1.0), side(1.0, LOCAL));
-    if inside.count < 3.0 || outside.count < 3.0 {
-        return;
-    }
+    let (Some(inside), Some(outside)) = (side(-line.width.min(LOCAL), -1.0), side(1.0, LOCAL)) else { return };
     let walk = Walk::new(picture, line, start * every * unit, every * unit);
     for (ratio, pixel) in ratios.iter_mut().zip(walk) {
         if let Some((column, row)) = pixel.filter(|_| *ratio != 0.0) {
             let value = brightness(picture, column, row);
-            let local = clamped(inside.log(value) - outside.log(value));
+            let local = clamped(inside(value) - outside(value));
             *ratio = 0.5 * (*ratio + local);
         }
     }
@@ -155,7 +137,7 @@ impl ScanView<'_> {
             }
             r += every;
         }
-        if let ColorPixels::Gray(_) = self.picture.pixels {
+        if self.picture.pixels.is_gray() {
             compare_locally(self, line, [start, every], ratios);
         }
     }
@@ -183,7 +165,7 @@ impl ScanView<'_> {
         if r.abs() < BESIDE {
             return Some(line.outside);
         }
-        let (label, depth) = self.labels.at(column, row);
+        let (label, depth) = self.camera.labels.at(column, row);
         let beyond = -r - line.width;
         if r < 0.0 && beyond < 0.0 && label == line.limb {
             Some(line.outside)

@@ -39,7 +39,7 @@ impl ColorRegions {
         let [width, height] = [picture.camera.width(), picture.camera.height()];
         let mut likely = vec![0.0; width * height];
         let Some(camera) = self.cameras.get(&picture.number) else { return likely };
-        let view = ScanView { picture, camera, labels: &camera.labels, groups: &self.groups };
+        let view = ScanView { picture, camera, groups: &self.groups };
         let cell = 1_usize << super::CELL_BITS;
         let cells = distances(&camera.labels, cell as f32 / camera.unit);
         let nearest = |index: usize| cells[index / width / cell * width.div_ceil(cell) + index % width / cell];

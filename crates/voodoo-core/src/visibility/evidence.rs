@@ -79,7 +79,7 @@ mod tests {
     use crate::math::Quat;
     use crate::observation::background::Backgrounds;
     use crate::observation::frame::{DepthImage, DepthPixels, Frame};
-    use crate::testing::pinhole;
+    use crate::testing::{pinhole, views};
     use crate::visibility::render::{Rendering, Viewpoint};
 
     const WIDTH: usize = 160;
@@ -107,8 +107,8 @@ mod tests {
             source: 0,
         }];
         let frame = Frame { images: &images, ..Frame::empty(0.0) };
-        let views =
-            DepthViews { frame: &frame, backgrounds: &Backgrounds::default(), segmented: &[false], origin: Vec3::ZERO };
+        let backgrounds = Backgrounds::default();
+        let views = views(&frame, &backgrounds);
         let mut all = Patches::default();
         body.limbs().iter().zip(poses).for_each(|(limb, pose)| all.add(limb_visibility(views, limb, pose)));
         all
@@ -164,8 +164,8 @@ mod tests {
             source: 0,
         }];
         let frame = Frame { images: &images, ..Frame::empty(0.0) };
-        let views =
-            DepthViews { frame: &frame, backgrounds: &Backgrounds::default(), segmented: &[false], origin: Vec3::ZERO };
+        let backgrounds = Backgrounds::default();
+        let views = views(&frame, &backgrounds);
         let at = |angle: f64| {
             let turn = Quat::from_axis_angle(Vec3::Y, angle);
             let middle = turn * Vec3::new(0.0, 0.0, 0.5 * limb.shape.length());

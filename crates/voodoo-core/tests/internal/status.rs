@@ -67,7 +67,12 @@ fn with_views<T>(shots: &[(Vec<u16>, Pose)], ask: impl FnOnce(DepthViews) -> T) 
     let frame = Frame { images: &images, ..Frame::empty(0.0) };
     let mut segmented = Vec::new();
     find_segmented(&frame, &mut segmented);
-    ask(DepthViews { frame: &frame, backgrounds: &Backgrounds::default(), segmented: &segmented, origin: Vec3::ZERO })
+    ask(DepthViews {
+        frame: &frame,
+        ownership: crate::testing::everything(&Backgrounds::default()),
+        segmented: &segmented,
+        origin: Vec3::ZERO,
+    })
 }
 
 fn proofs(body: &Body, poses: &[Pose], shots: &[(Vec<u16>, Pose)]) -> Vec<LimbSupport> {

@@ -117,7 +117,7 @@ impl Assessor {
         poses: &[Pose],
         detected: Option<Detected>,
     ) {
-        if context.observation.candidates.is_empty() && correspondences.sites.is_empty() {
+        if context.observation.candidates.points.is_empty() && correspondences.sites.is_empty() {
             // Nothing was measured, and earlier evidence does not count for this frame.
             self.limbs.clear();
         }
