@@ -39,9 +39,8 @@ use segmentation::Segmentation;
 use std::sync::{Arc, LazyLock};
 use voodoo_core::math::{Aabb, Pose, Vec3};
 use voodoo_core::{
-    Body, DepthImage, Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Ground, Surroundings,
+    Body, DepthImage, Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Ground, Surroundings, Unexpected,
 };
-use weights::WeightsError;
 
 /// Log odds above which a candidate counts as a person.
 const PERSON: f64 = 0.0;
@@ -79,7 +78,7 @@ pub struct Detector {
 }
 
 /// The network that ships with the library, read at first use.
-static SHIPPED: LazyLock<Result<Arc<Network>, WeightsError>> =
+static SHIPPED: LazyLock<Result<Arc<Network>, Unexpected>> =
     LazyLock::new(|| Network::read(include_bytes!("../person.weights")).map(Arc::new));
 
 impl Detector {
@@ -93,11 +92,10 @@ impl Detector {
     /// # Errors
     ///
     /// If the bytes are not weights of a network of this structure and with these joints.
-    pub fn with_weights(bytes: &[u8]) -> Result<Self, WeightsError> {
+    pub fn with_weights(bytes: &[u8]) -> Result<Self, Unexpected> {
         let network = Network::read(bytes)?;
-        if network.joints() != JOINTS.len() {
-            return Err(WeightsError::new(format!("{} joints", JOINTS.len()), network.joints().to_string()));
-        }
+        let (expected, found) = (JOINTS.len(), network.joints());
+        Unexpected::unless(found == expected, "weights", format_args!("{expected} joints"), found)?;
         Ok(Self { network: Some(Arc::new(network)), ..Self::default() })
     }
 
