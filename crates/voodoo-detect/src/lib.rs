@@ -206,7 +206,7 @@ impl Detect for Detector {
                 continue;
             }
             detection.floor = floor;
-            segmentation.mask(candidate, &mut detection.pixels);
+            detection.pixels = segmentation.mask(candidate);
             shown.push(candidate.clone());
             kept.push(detection);
         }

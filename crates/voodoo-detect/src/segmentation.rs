@@ -38,11 +38,9 @@ impl Segmentation {
         self.parts.find(&self.view, &mut self.candidates);
     }
 
-    /// Writes the full-image indices of all pixels of a candidate, including those skipped by the subsampling.
-    pub fn mask(&self, candidate: &PersonCandidate, into: &mut Vec<usize>) {
-        into.clear();
-        for (index, _) in self.parts.labels.iter().enumerate().filter(|(_, label)| candidate.has(label)) {
-            self.view.block(index, into);
-        }
+    /// The full-image indices of all pixels of a candidate, including those skipped by the subsampling.
+    pub fn mask(&self, candidate: &PersonCandidate) -> Vec<usize> {
+        let own = self.parts.labels.iter().enumerate().filter(|(_, label)| candidate.has(label));
+        own.flat_map(|(index, _)| self.view.block(index)).collect()
     }
 }
