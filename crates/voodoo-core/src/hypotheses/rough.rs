@@ -85,7 +85,7 @@ impl RoughSearch {
             }
         }
         sample.subsample(ROUGH_SAMPLE);
-        reset(others, sample.len(), f32::INFINITY);
+        reset(others, sample.weights.len(), f32::INFINITY);
         let (body, poses) = (&at.context.model.body, at.poses);
         for limb in (0..poses.len()).filter(|limb| at.chain.limbs().all(|own| own != *limb)) {
             explain(body, limb, poses, &sample.points, others, distances);
