@@ -1,7 +1,7 @@
 //! Segments a depth image into candidates and crops them for the network.
 
 use crate::components::{Components, PersonCandidate};
-use crate::floor::FloorFinder;
+use crate::floor::find_floor;
 use crate::view::ThinnedImage;
 use voodoo_core::math::Vec3;
 use voodoo_core::{DepthImage, Ground, Surroundings};
@@ -30,7 +30,7 @@ impl Segmentation {
         });
         // If no upward direction is given, up is upwards in the image.
         let up = around.up.map_or(-Vec3::Y, |up| camera_from_world.rotation * up);
-        self.floor = given.or_else(|| FloorFinder::new(&self.view, up).find(up));
+        self.floor = given.or_else(|| find_floor(&self.view, up));
         self.up = self.floor.map_or(up, |floor| floor.normal);
         if let Some(floor) = &self.floor {
             self.view.remove_floor(floor);
