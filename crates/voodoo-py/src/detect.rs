@@ -167,13 +167,8 @@ pub(crate) fn person_candidates<'py>(
         let channels: Vec<f32> = (0..2).flat_map(|c| crop.pixels.iter().map(move |pixel| pixel[c])).collect();
         let picture = PyArray1::from_vec(py, channels).reshape([2, SIZE, SIZE])?;
         let floor = segmentation.floor.map(|floor| (floor.normal.to_array(), floor.offset));
-        found.push(class.call1((
-            picture,
-            mask(py, &camera, &segmentation.mask(candidate))?,
-            crop.middle,
-            crop.roll,
-            floor,
-        ))?);
+        let pixels = mask(py, &camera, &segmentation.mask(candidate))?;
+        found.push(class.call1((picture, pixels, crop.middle, crop.roll, floor))?);
     }
     Ok(found)
 }
