@@ -164,18 +164,16 @@ impl Detect for Detector {
         self.segmentation.find(image, around);
         let Self { memory, segmentation, found: shown, nearest, rejections, stature, .. } = self;
         let mut found: Vec<(&PersonCandidate, Detection)> = Vec::new();
-        let mut evaluations = 0;
-        for candidate in order(&segmentation.candidates, rejections, query, &image.world_from_sensor.inverse()) {
+        let most = if query == DetectionQuery::All { MAX_EVALUATIONS } else { 1 };
+        let order = order(&segmentation.candidates, rejections, query, &image.world_from_sensor.inverse());
+        for candidate in order.into_iter().take(most) {
             let mut evaluate = |enlarged: f64| {
                 let crop = segmentation.crop(candidate, enlarged)?;
                 let answer = network.evaluate(&crop.pixels, memory);
                 Some(detection(&answer, &crop, candidate, &image.world_from_sensor))
             };
             let Some(mut detection) = evaluate(enlargement(stature.map(|[stature, _]| stature))) else { continue };
-            evaluations += 1;
-            if nearest.is_none() {
-                *nearest = Some((detection.person, detection.bounds));
-            }
+            nearest.get_or_insert((detection.person, detection.bounds));
             if detection.person > PERSON {
                 let enlarged = enlargement(detection.lengths.last().map(|[length, _]| *length));
                 if let Some(known) = *stature {
@@ -189,9 +187,6 @@ impl Detect for Detector {
             rejections.record(candidate, detection.person > PERSON);
             if detection.person > PERSON {
                 found.push((candidate, detection));
-            }
-            if evaluations == MAX_EVALUATIONS || query != DetectionQuery::All {
-                break;
             }
         }
         found.sort_by(|(_, a), (_, b)| b.person.total_cmp(&a.person));
