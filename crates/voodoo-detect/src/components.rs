@@ -53,8 +53,7 @@ impl Component {
 
     /// Adds a point; only every `every`-th is kept once there are many.
     fn add(&mut self, point: Vec3) {
-        self.bounds.mins = self.bounds.mins.min(point);
-        self.bounds.maxs = self.bounds.maxs.max(point);
+        self.bounds = self.bounds.union(Aabb::new(point, point));
         // `every` is a power of two, which avoids a division per pixel.
         if self.added & (self.every - 1) == 0 {
             if self.samples.len() == COMPONENT_SAMPLES {
@@ -301,7 +300,7 @@ impl Components {
     fn propose(&self, candidates: &mut Vec<PersonCandidate>) {
         for (number, part) in self.parts.iter().enumerate() {
             let large = (0.3 * AREA[0]..=AREA[1]).contains(&part.area);
-            if !large || is_flat(&part.samples, longest_edge(&part.bounds)) {
+            if !large || is_flat(&part.samples, part.bounds.extents().max_element()) {
                 continue;
             }
             let alone = PersonCandidate { labels: vec![part.label], area: part.area, bounds: part.bounds };
@@ -309,7 +308,7 @@ impl Components {
             for candidate in [alone, together] {
                 let within = |size: f64, [least, most]: [f64; 2]| least < size && size < most;
                 if within(candidate.area, AREA)
-                    && within(longest_edge(&candidate.bounds), LENGTH)
+                    && within(candidate.bounds.extents().max_element(), LENGTH)
                     && !candidates.contains(&candidate)
                 {
                     candidates.push(candidate);
@@ -330,9 +329,8 @@ impl Components {
                 if taken.contains(&number) || whole.area + other.area > AREA[1] {
                     continue;
                 }
-                let [own, more] = [whole.bounds, other.bounds];
-                let bounds = Aabb::from_points([own.mins, own.maxs, more.mins, more.maxs]);
-                if longest_edge(&bounds) < LENGTH[1] && near(from, other) {
+                let bounds = whole.bounds.union(other.bounds);
+                if bounds.extents().max_element() < LENGTH[1] && near(from, other) {
                     taken.push(number);
                     whole.labels.push(other.label);
                     whole.area += other.area;
@@ -343,10 +341,6 @@ impl Components {
         whole.labels.sort_unstable();
         whole
     }
-}
-
-fn longest_edge(bounds: &Aabb) -> f64 {
-    (bounds.maxs - bounds.mins).max_element()
 }
 
 /// Whether two components are closer to each other than components of one person may be.

@@ -3,8 +3,9 @@
 //! A map is stored row by row; the channels of a pixel are adjacent.
 
 use crate::product::Panels;
-use crate::weights::{Weights, WeightsError};
+use crate::weights::Weights;
 use crate::winograd::{KERNEL, Winograd, Working};
+use voodoo_core::Unexpected;
 use voodoo_core::math::reset;
 
 /// A square feature map.
@@ -42,7 +43,7 @@ impl Convolution {
         [stride, edge]: [usize; 2],
         inputs: usize,
         outputs: Option<usize>,
-    ) -> Result<Self, WeightsError> {
+    ) -> Result<Self, Unexpected> {
         let layer = weights.layer(name, 4, inputs, outputs)?;
         Ok(Self::from_weights(&layer.weights, &layer.bias, layer.kernel, stride, edge))
     }

@@ -97,8 +97,7 @@ mod tests {
             let crop = segmentation.crop(&candidate, enlarged).unwrap();
             assert!((crop.roll - roll).abs() < 1e-9, "{}", crop.roll);
             // Every pixel on the person, transformed back to the camera frame, coincides with a measured point.
-            let mut mask = Vec::new();
-            segmentation.mask(&candidate, &mut mask);
+            let mask = segmentation.mask(&candidate);
             let point = |pixel: &usize| image.back_project(*pixel, 0.001 * image.pixels.get(*pixel));
             let points: Vec<Vec3> = mask.iter().map(point).collect();
             let half = 0.5 * (SIZE as f64 - 1.0);

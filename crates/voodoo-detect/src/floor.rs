@@ -55,109 +55,89 @@ impl PointLanes {
     }
 }
 
-/// Points that were sampled from an image.
-#[derive(Debug, Default)]
-pub(crate) struct FloorFinder {
-    points: PointLanes,
-    /// Points on surfaces that face upwards.
-    level: Vec<Vec3>,
-    level_lanes: PointLanes,
+/// Returns the floor of an image in the camera frame; `up` is the approximate upward direction in that frame.
+pub(crate) fn find_floor(view: &ThinnedImage, up: Vec3) -> Option<Ground> {
+    // A sample of the points, and those of them on surfaces that face upwards.
+    let (mut points, mut level, mut level_lanes) = (PointLanes::default(), Vec::new(), PointLanes::default());
+    let returns = view.depth.iter().filter(|z| **z > 0.0).count();
+    let step = (returns / FLOOR_SAMPLES).max(1);
+    let beside = ((NEIGHBOR * view.width as f64) as usize).max(2);
+    for index in (0..view.depth.len()).filter(|index| view.depth[*index] > 0.0).step_by(step) {
+        let point = view.point(index);
+        points.push(point);
+        let (column, row) = (index % view.width, index / view.width);
+        if column < beside || row < beside {
+            continue;
+        }
+        let [left, above] = [index - beside, index - beside * view.width];
+        if view.depth[left] > 0.0 && view.depth[above] > 0.0 {
+            let normal = (view.point(left) - point).cross(view.point(above) - point).normalize_or_zero();
+            if normal.dot(up).abs() > LEAST_UPRIGHT {
+                level.push(point);
+                level_lanes.push(point);
+            }
+        }
+    }
+    if level.len() < 20 {
+        return None;
+    }
+    // Points in a pseudo-random sequence that is the same on every run (Vigna's splitmix64).
+    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
+    let mut draw = || {
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut value = state;
+        value = (value ^ (value >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        value = (value ^ (value >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        level[((value ^ (value >> 31)) % level.len() as u64) as usize]
+    };
+    let below = |height: f32| if height < -2.0 { 1.0 } else { 0.0 };
+    // A truncated squared distance: it prefers planes through the middle of horizontal points to planes beside them.
+    let on = |height: f32| (1.0 - height * height).max(0.0);
+    let mut best: Option<(f64, Ground)> = None;
+    for _ in 0..TRIALS {
+        let [a, b, c] = [(); 3].map(|()| draw());
+        let normal = (b - a).cross(c - a);
+        let Some(normal) = normal.try_normalize() else { continue };
+        let normal = if normal.dot(up) < 0.0 { -normal } else { normal };
+        if normal.dot(up) < LEAST_UPRIGHT {
+            continue;
+        }
+        let plane = Ground { normal, offset: normal.dot(a) };
+        let score = level_lanes.sum(&plane, on) - BELOW * points.sum(&plane, below);
+        if best.is_none_or(|(most, _)| score > most) {
+            best = Some((score, plane));
+        }
+    }
+    let (score, plane) = best?;
+    let fitted = |plane, fraction: &f64| refined(&level, plane, *fraction);
+    (score > LEAST_FRACTION * points.near.len() as f64).then(|| NEARER.iter().fold(plane, fitted))
 }
 
-impl FloorFinder {
-    /// Returns the floor in the camera frame; `up` is the approximate upward direction in that frame.
-    pub(crate) fn find(&self, up: Vec3) -> Option<Ground> {
-        let count = self.points.near.len();
-        if self.level.len() < 20 {
-            return None;
-        }
-        // Points in a pseudo-random sequence that is the same on every run (Vigna's splitmix64).
-        let mut state = 0x9e37_79b9_7f4a_7c15_u64;
-        let mut draw = || {
-            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mut value = state;
-            value = (value ^ (value >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            value = (value ^ (value >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            self.level[((value ^ (value >> 31)) % self.level.len() as u64) as usize]
-        };
-        let mut best: Option<(f64, Ground)> = None;
-        for _ in 0..TRIALS {
-            let [a, b, c] = [(); 3].map(|()| draw());
-            let normal = (b - a).cross(c - a);
-            let Some(normal) = normal.try_normalize() else { continue };
-            let normal = if normal.dot(up) < 0.0 { -normal } else { normal };
-            if normal.dot(up) < LEAST_UPRIGHT {
-                continue;
-            }
-            let plane = Ground { normal, offset: normal.dot(a) };
-            let score = self.score(&plane);
-            if best.is_none_or(|(most, _)| score > most) {
-                best = Some((score, plane));
-            }
-        }
-        let (score, plane) = best?;
-        let fitted = |plane, fraction: &f64| self.refined(&plane, *fraction);
-        (score > LEAST_FRACTION * count as f64).then(|| NEARER.iter().fold(plane, fitted))
+/// Refits the plane to all nearby ones of these points on horizontal surfaces, by least squares along its normal.
+fn refined(level: &[Vec3], plane: Ground, fraction: f64) -> Ground {
+    let near = |point: &Vec3| fraction * (NEAR[0] + NEAR[1] * point.z * point.z);
+    let on = |point: &&Vec3| (plane.normal.dot(**point) - plane.offset).abs() < near(point);
+    let points: Vec<&Vec3> = level.iter().filter(on).collect();
+    let mean = points.iter().copied().sum::<Vec3>() / (points.len() as f64).max(1.0);
+    let first = plane.normal.any_orthonormal_vector();
+    let second = plane.normal.cross(first);
+    let (mut uu, mut uv, mut vv, mut uh, mut vh) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for point in points {
+        let from = *point - mean;
+        let (u, v, h) = (from.dot(first), from.dot(second), from.dot(plane.normal));
+        uu += u * u;
+        uv += u * v;
+        vv += v * v;
+        uh += u * h;
+        vh += v * h;
     }
-
-    /// Samples points; `up` is the approximate upward direction.
-    pub(crate) fn new(view: &ThinnedImage, up: Vec3) -> Self {
-        let mut sampled = Self::default();
-        let returns = view.depth.iter().filter(|z| **z > 0.0).count();
-        let step = (returns / FLOOR_SAMPLES).max(1);
-        let beside = ((NEIGHBOR * view.width as f64) as usize).max(2);
-        for index in (0..view.depth.len()).filter(|index| view.depth[*index] > 0.0).step_by(step) {
-            let point = view.point(index);
-            sampled.points.push(point);
-            let (column, row) = (index % view.width, index / view.width);
-            if column < beside || row < beside {
-                continue;
-            }
-            let [left, above] = [index - beside, index - beside * view.width];
-            if view.depth[left] > 0.0 && view.depth[above] > 0.0 {
-                let normal = (view.point(left) - point).cross(view.point(above) - point).normalize_or_zero();
-                if normal.dot(up).abs() > LEAST_UPRIGHT {
-                    sampled.level.push(point);
-                    sampled.level_lanes.push(point);
-                }
-            }
-        }
-        sampled
+    let determinant = uu * vv - uv * uv;
+    if determinant < 1e-9 {
+        return plane;
     }
-
-    fn score(&self, plane: &Ground) -> f64 {
-        let below = |height: f32| if height < -2.0 { 1.0 } else { 0.0 };
-        // A truncated squared distance: it prefers planes through the middle of horizontal points to planes beside them.
-        let on = |height: f32| (1.0 - height * height).max(0.0);
-        self.level_lanes.sum(plane, on) - BELOW * self.points.sum(plane, below)
-    }
-
-    /// Refits the plane to all nearby points on horizontal surfaces, by least squares along its normal.
-    fn refined(&self, plane: &Ground, fraction: f64) -> Ground {
-        let near = |point: &Vec3| fraction * (NEAR[0] + NEAR[1] * point.z * point.z);
-        let on = |point: &&Vec3| (plane.normal.dot(**point) - plane.offset).abs() < near(point);
-        let points: Vec<&Vec3> = self.level.iter().filter(on).collect();
-        let mean = points.iter().copied().sum::<Vec3>() / (points.len() as f64).max(1.0);
-        let first = plane.normal.any_orthonormal_vector();
-        let second = plane.normal.cross(first);
-        let (mut uu, mut uv, mut vv, mut uh, mut vh) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        for point in points {
-            let from = *point - mean;
-            let (u, v, h) = (from.dot(first), from.dot(second), from.dot(plane.normal));
-            uu += u * u;
-            uv += u * v;
-            vv += v * v;
-            uh += u * h;
-            vh += v * h;
-        }
-        let determinant = uu * vv - uv * uv;
-        if determinant < 1e-9 {
-            return *plane;
-        }
-        let (along_u, along_v) = ((uh * vv - vh * uv) / determinant, (vh * uu - uh * uv) / determinant);
-        let normal = (plane.normal - along_u * first - along_v * second).normalize();
-        Ground { normal, offset: normal.dot(mean) }
-    }
+    let (along_u, along_v) = ((uh * vv - vh * uv) / determinant, (vh * uu - uh * uv) / determinant);
+    let normal = (plane.normal - along_u * first - along_v * second).normalize();
+    Ground { normal, offset: normal.dot(mean) }
 }
 
 #[cfg(test)]
@@ -200,7 +180,7 @@ mod tests {
             source: 0,
         };
         view.read(&image, &Surroundings::default());
-        FloorFinder::new(&view, -Vec3::Y).find(-Vec3::Y)
+        find_floor(&view, -Vec3::Y)
     }
 
     #[test]

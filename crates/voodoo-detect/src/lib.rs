@@ -39,9 +39,8 @@ use segmentation::Segmentation;
 use std::sync::{Arc, LazyLock};
 use voodoo_core::math::{Aabb, Pose, Vec3};
 use voodoo_core::{
-    Body, DepthImage, Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Ground, Surroundings,
+    Body, DepthImage, Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Ground, Surroundings, Unexpected,
 };
-use weights::WeightsError;
 
 /// Log odds above which a candidate counts as a person.
 const PERSON: f64 = 0.0;
@@ -79,7 +78,7 @@ pub struct Detector {
 }
 
 /// The network that ships with the library, read at first use.
-static SHIPPED: LazyLock<Result<Arc<Network>, WeightsError>> =
+static SHIPPED: LazyLock<Result<Arc<Network>, Unexpected>> =
     LazyLock::new(|| Network::read(include_bytes!("../person.weights")).map(Arc::new));
 
 impl Detector {
@@ -93,11 +92,10 @@ impl Detector {
     /// # Errors
     ///
     /// If the bytes are not weights of a network of this structure and with these joints.
-    pub fn with_weights(bytes: &[u8]) -> Result<Self, WeightsError> {
+    pub fn with_weights(bytes: &[u8]) -> Result<Self, Unexpected> {
         let network = Network::read(bytes)?;
-        if network.joints() != JOINTS.len() {
-            return Err(WeightsError::new(format!("{} joints", JOINTS.len()), network.joints().to_string()));
-        }
+        let (expected, found) = (JOINTS.len(), network.joints());
+        Unexpected::unless(found == expected, "weights", format_args!("{expected} joints"), found)?;
         Ok(Self { network: Some(Arc::new(network)), ..Self::default() })
     }
 
@@ -166,18 +164,16 @@ impl Detect for Detector {
         self.segmentation.find(image, around);
         let Self { memory, segmentation, found: shown, nearest, rejections, stature, .. } = self;
         let mut found: Vec<(&PersonCandidate, Detection)> = Vec::new();
-        let mut evaluations = 0;
-        for candidate in order(&segmentation.candidates, rejections, query, &image.world_from_sensor.inverse()) {
+        let most = if query == DetectionQuery::All { MAX_EVALUATIONS } else { 1 };
+        let order = order(&segmentation.candidates, rejections, query, &image.world_from_sensor.inverse());
+        for candidate in order.into_iter().take(most) {
             let mut evaluate = |enlarged: f64| {
                 let crop = segmentation.crop(candidate, enlarged)?;
                 let answer = network.evaluate(&crop.pixels, memory);
                 Some(detection(&answer, &crop, candidate, &image.world_from_sensor))
             };
             let Some(mut detection) = evaluate(enlargement(stature.map(|[stature, _]| stature))) else { continue };
-            evaluations += 1;
-            if nearest.is_none() {
-                *nearest = Some((detection.person, detection.bounds));
-            }
+            nearest.get_or_insert((detection.person, detection.bounds));
             if detection.person > PERSON {
                 let enlarged = enlargement(detection.lengths.last().map(|[length, _]| *length));
                 if let Some(known) = *stature {
@@ -192,9 +188,6 @@ impl Detect for Detector {
             if detection.person > PERSON {
                 found.push((candidate, detection));
             }
-            if evaluations == MAX_EVALUATIONS || query != DetectionQuery::All {
-                break;
-            }
         }
         found.sort_by(|(_, a), (_, b)| b.person.total_cmp(&a.person));
         let floor = segmentation.floor.map(|floor| {
@@ -208,7 +201,7 @@ impl Detect for Detector {
                 continue;
             }
             detection.floor = floor;
-            segmentation.mask(candidate, &mut detection.pixels);
+            detection.pixels = segmentation.mask(candidate);
             shown.push(candidate.clone());
             kept.push(detection);
         }

@@ -6,8 +6,9 @@
 use crate::convolution::{Convolution, Map, rectify};
 use crate::crop::{SIZE, WIDTH};
 use crate::product::Panels;
-use crate::weights::{Weights, WeightsError};
+use crate::weights::Weights;
 use crate::winograd::Working;
+use voodoo_core::Unexpected;
 use voodoo_core::math::refill;
 
 /// Values per cell and joint: weight, offset to the right, offset down, depth.
@@ -21,7 +22,7 @@ struct Residual {
 }
 
 impl Residual {
-    fn take(weights: &mut Weights, name: &str, edge: usize, channels: usize) -> Result<Self, WeightsError> {
+    fn take(weights: &mut Weights, name: &str, edge: usize, channels: usize) -> Result<Self, Unexpected> {
         let first = Convolution::take(weights, &format!("{name}.a"), [1, edge], channels, None)?;
         let second = Convolution::take(weights, &format!("{name}.b"), [1, edge], first.outputs, Some(channels))?;
         Ok(Self { first, second })
@@ -44,12 +45,7 @@ struct Stage {
 
 impl Stage {
     /// Takes a stage whose input maps have this `edge`.
-    fn take(
-        weights: &mut Weights,
-        name: &str,
-        [stride, edge]: [usize; 2],
-        inputs: usize,
-    ) -> Result<Self, WeightsError> {
+    fn take(weights: &mut Weights, name: &str, [stride, edge]: [usize; 2], inputs: usize) -> Result<Self, Unexpected> {
         let reduce = Convolution::take(weights, &format!("{name}.conv"), [stride, edge], inputs, None)?;
         let mut blocks = Vec::new();
         while weights.has(&format!("{name}.res{}.a.weight", blocks.len())) {
@@ -61,7 +57,7 @@ impl Stage {
 }
 
 /// Takes a linear layer: a matrix and a bias.
-fn linear(weights: &mut Weights, name: &str, inputs: usize, outputs: Option<usize>) -> Result<Panels, WeightsError> {
+fn linear(weights: &mut Weights, name: &str, inputs: usize, outputs: Option<usize>) -> Result<Panels, Unexpected> {
     let layer = weights.layer(name, 2, inputs, outputs)?;
     Ok(Panels::from_weights(&layer.weights, &layer.bias))
 }
@@ -115,7 +111,7 @@ pub struct Memory {
 
 impl Network {
     /// Reads the bytes of a file of weights.
-    pub fn read(bytes: &[u8]) -> Result<Self, WeightsError> {
+    pub fn read(bytes: &[u8]) -> Result<Self, Unexpected> {
         let weights = &mut Weights::read(bytes)?;
         let s2 = Stage::take(weights, "s2", [4, SIZE], 2)?;
         let s3 = Stage::take(weights, "s3", [2, SIZE / 4], s2.reduce.outputs)?;

@@ -1,7 +1,7 @@
 //! Segments a depth image into candidates and crops them for the network.
 
 use crate::components::{Components, PersonCandidate};
-use crate::floor::FloorFinder;
+use crate::floor::find_floor;
 use crate::view::ThinnedImage;
 use voodoo_core::math::Vec3;
 use voodoo_core::{DepthImage, Ground, Surroundings};
@@ -30,7 +30,7 @@ impl Segmentation {
         });
         // If no upward direction is given, up is upwards in the image.
         let up = around.up.map_or(-Vec3::Y, |up| camera_from_world.rotation * up);
-        self.floor = given.or_else(|| FloorFinder::new(&self.view, up).find(up));
+        self.floor = given.or_else(|| find_floor(&self.view, up));
         self.up = self.floor.map_or(up, |floor| floor.normal);
         if let Some(floor) = &self.floor {
             self.view.remove_floor(floor);
@@ -38,11 +38,9 @@ impl Segmentation {
         self.parts.find(&self.view, &mut self.candidates);
     }
 
-    /// Writes the full-image indices of all pixels of a candidate, including those skipped by the subsampling.
-    pub fn mask(&self, candidate: &PersonCandidate, into: &mut Vec<usize>) {
-        into.clear();
-        for (index, _) in self.parts.labels.iter().enumerate().filter(|(_, label)| candidate.has(label)) {
-            self.view.block(index, into);
-        }
+    /// The full-image indices of all pixels of a candidate, including those skipped by the subsampling.
+    pub fn mask(&self, candidate: &PersonCandidate) -> Vec<usize> {
+        let own = self.parts.labels.iter().enumerate().filter(|(_, label)| candidate.has(label));
+        own.flat_map(|(index, _)| self.view.block(index)).collect()
     }
 }

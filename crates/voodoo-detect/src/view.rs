@@ -88,12 +88,11 @@ impl ThinnedImage {
         (self.step * self.step) as f64 / (fx * fy)
     }
 
-    /// Appends the pixels of the full image that a pixel stands for.
-    pub(crate) fn block(&self, index: usize, into: &mut Vec<usize>) {
+    /// The pixels of the full image that a pixel stands for.
+    pub(crate) fn block(&self, index: usize) -> impl Iterator<Item = usize> {
         let (row, column) = (index / self.width * self.step, index % self.width * self.step);
         let [rows, columns] = self.camera.as_ref().map_or([0; 2], |camera| [camera.height(), camera.width()]);
-        for row in row..(row + self.step).min(rows) {
-            into.extend((column..(column + self.step).min(columns)).map(|column| row * columns + column));
-        }
+        let across = column..(column + self.step).min(columns);
+        (row..(row + self.step).min(rows)).flat_map(move |row| across.clone().map(move |column| row * columns + column))
     }
 }

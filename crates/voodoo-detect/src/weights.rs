@@ -5,25 +5,10 @@
 //! (IEEE 754 binary16). Weights of convolutions have the shape (out, ky, kx, in), those of linear layers (out, in).
 
 use std::collections::BTreeMap;
+use voodoo_core::Unexpected;
 
 /// First line of a file.
 const FIRST_LINE: &str = "voodoo person 1";
-
-/// What is wrong with a file of weights.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("weights: expected {expected}, found {found}")]
-pub struct WeightsError {
-    /// What was expected.
-    pub expected: String,
-    /// What was found.
-    pub found: String,
-}
-
-impl WeightsError {
-    pub(crate) fn new(expected: impl Into<String>, found: impl Into<String>) -> Self {
-        Self { expected: expected.into(), found: found.into() }
-    }
-}
 
 /// A matrix with a row for every output and a column for every input, its biases, and the edge of its kernel.
 #[derive(Debug)]
@@ -41,32 +26,29 @@ pub(crate) struct Weights {
 
 impl Weights {
     /// Parses the bytes of a file.
-    pub(crate) fn read(bytes: &[u8]) -> Result<Self, WeightsError> {
-        let ascii = || WeightsError::new("lines of ASCII and an empty line", "something else");
+    pub(crate) fn read(bytes: &[u8]) -> Result<Self, Unexpected> {
+        let ascii = || Unexpected::new("weights", "lines of ASCII and an empty line", "something else");
         let end = bytes.windows(2).position(|pair| pair == b"\n\n").ok_or_else(ascii)?;
         let mut lines = std::str::from_utf8(&bytes[..end]).map_err(|_| ascii())?.lines();
         let first = lines.next().unwrap_or_default();
-        if first != FIRST_LINE {
-            return Err(WeightsError::new(format!("a first line {FIRST_LINE:?}"), format!("{first:?}")));
-        }
+        let expected = format_args!("a first line {FIRST_LINE:?}");
+        Unexpected::unless(first == FIRST_LINE, "weights", expected, format_args!("{first:?}"))?;
         let (mut rest, mut tensors) = (&bytes[end + 2..], BTreeMap::new());
         for line in lines {
             let mut words = line.split(' ');
             let name = words.next().unwrap_or_default();
-            let wrong = |_| WeightsError::new("a name and whole numbers in each line", format!("the line of {name}"));
+            let (expected, found) = ("a name and whole numbers in each line", format_args!("the line of {name}"));
+            let wrong = |_| Unexpected::new("weights", expected, found);
             let shape = words.map(str::parse::<usize>).collect::<Result<Vec<_>, _>>().map_err(wrong)?;
             let count = shape.iter().try_fold(1_usize, |count, edge| count.checked_mul(*edge));
             let bytes = count.and_then(|count| count.checked_mul(2)).and_then(|bytes| rest.split_at_checked(bytes));
-            let Some((values, after)) = bytes else {
-                return Err(WeightsError::new(format!("{shape:?} values of {name}"), format!("{} bytes", rest.len())));
-            };
+            let (expected, found) = (format_args!("{shape:?} values of {name}"), format_args!("{} bytes", rest.len()));
+            let (values, after) = bytes.ok_or_else(|| Unexpected::new("weights", expected, found))?;
             rest = after;
             let values = values.as_chunks().0.iter().map(|half| from_half(*half)).collect();
             tensors.insert(name.to_owned(), (shape, values));
         }
-        if !rest.is_empty() {
-            return Err(WeightsError::new("the end", format!("{} bytes", rest.len())));
-        }
+        Unexpected::unless(rest.is_empty(), "weights", "the end", format_args!("{} bytes", rest.len()))?;
         Ok(Self { tensors })
     }
 
@@ -76,14 +58,11 @@ impl Weights {
     }
 
     /// Takes the shape and values of a tensor with `edges` dimensions.
-    fn take(&mut self, name: &str, edges: usize) -> Result<(Vec<usize>, Vec<f32>), WeightsError> {
-        let expected_text = || format!("{name} with {edges} edge(s)");
-        let Some((shape, values)) = self.tensors.remove(name) else {
-            return Err(WeightsError::new(expected_text(), "none"));
-        };
-        if shape.len() != edges || values.is_empty() || !values.iter().all(|value| value.is_finite()) {
-            return Err(WeightsError::new(expected_text(), format!("{shape:?}, or values that are not finite")));
-        }
+    fn take(&mut self, name: &str, edges: usize) -> Result<(Vec<usize>, Vec<f32>), Unexpected> {
+        let expected = format_args!("{name} with {edges} edge(s)");
+        let (shape, values) = self.tensors.remove(name).ok_or_else(|| Unexpected::new("weights", expected, "none"))?;
+        let valid = shape.len() == edges && !values.is_empty() && values.iter().all(|value| value.is_finite());
+        Unexpected::unless(valid, "weights", expected, format_args!("{shape:?}, or values that are not finite"))?;
         Ok((shape, values))
     }
 
@@ -94,17 +73,15 @@ impl Weights {
         edges: usize,
         inputs: usize,
         outputs: Option<usize>,
-    ) -> Result<Layer, WeightsError> {
+    ) -> Result<Layer, Unexpected> {
         let (shape, weights) = self.take(&format!("{name}.weight"), edges)?;
         let (_, bias) = self.take(&format!("{name}.bias"), 1)?;
         let outputs = outputs.unwrap_or(shape[0]);
         let square = edges == 2 || shape[1] == shape[2];
-        if !square || [shape[edges - 1], shape[0], bias.len()] != [inputs, outputs, outputs] {
-            return Err(WeightsError::new(
-                format!("a square kernel, {inputs} inputs, {outputs} outputs and {outputs} biases of {name}"),
-                format!("{shape:?} and {}", bias.len()),
-            ));
-        }
+        let fits = square && [shape[edges - 1], shape[0], bias.len()] == [inputs, outputs, outputs];
+        let expected =
+            format_args!("a square kernel, {inputs} inputs, {outputs} outputs and {outputs} biases of {name}");
+        Unexpected::unless(fits, "weights", expected, format_args!("{shape:?} and {}", bias.len()))?;
         let kernel = if edges == 4 { shape[1] } else { 1 };
         Ok(Layer { weights, bias, kernel })
     }

@@ -161,14 +161,14 @@ pub(crate) fn person_candidates<'py>(
     let mut segmentation = Segmentation::default();
     segmentation.find(&image, &around);
     let class = py.import("voodoo.detectors.base")?.getattr("PersonCandidate")?;
-    let (mut found, mut pixels) = (Vec::new(), Vec::new());
+    let mut found = Vec::new();
     for candidate in segmentation.candidates.iter().take(most) {
         let Some(crop) = segmentation.crop(candidate, enlarged) else { continue };
-        segmentation.mask(candidate, &mut pixels);
         let channels: Vec<f32> = (0..2).flat_map(|c| crop.pixels.iter().map(move |pixel| pixel[c])).collect();
         let picture = PyArray1::from_vec(py, channels).reshape([2, SIZE, SIZE])?;
         let floor = segmentation.floor.map(|floor| (floor.normal.to_array(), floor.offset));
-        found.push(class.call1((picture, mask(py, &camera, &pixels)?, crop.middle, crop.roll, floor))?);
+        let pixels = mask(py, &camera, &segmentation.mask(candidate))?;
+        found.push(class.call1((picture, pixels, crop.middle, crop.roll, floor))?);
     }
     Ok(found)
 }

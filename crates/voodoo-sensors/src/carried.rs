@@ -78,9 +78,8 @@ fn change(motion: &LimbMotion, limb: usize, fraction: f64) -> Affine3 {
         .map(|poses| Affine3::from_rotation_translation(poses[limb].rotation, poses[limb].translation));
     let turned = now.matrix3 * then.matrix3.transpose();
     let shift = now.translation - turned * then.translation;
-    let scale = |value: f64| value / motion.interval * fraction;
-    let columns = (turned - Mat3::IDENTITY).to_cols_array().map(scale);
-    Affine3::from_mat3_translation(Mat3::from_cols_array(&columns), Vec3::from_array(shift.to_array().map(scale)))
+    let turn = turned - Mat3::IDENTITY;
+    Affine3::from_mat3_translation(turn / motion.interval * fraction, shift / motion.interval * fraction)
 }
 
 #[cfg(test)]

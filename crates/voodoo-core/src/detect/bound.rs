@@ -2,9 +2,9 @@
 
 use super::{Detect, DetectError, Detected, DetectedJoint, Detection, DetectionQuery, JointMap, Surroundings, place};
 use crate::body::Body;
+use crate::error::Unexpected;
 use crate::math::{Aabb, Vec3, is_place};
 use crate::observation::frame::DepthImage;
-use std::fmt::Display;
 
 /// A detection and the position of the body's root that follows from it.
 #[derive(Clone, Debug)]
@@ -114,33 +114,30 @@ fn with_pixels(mut detection: Detection, image: &DepthImage, around: &Surroundin
 }
 
 /// Rejects a detection with invalid values.
-fn check(detection: &Detection, map: &JointMap, image: &DepthImage) -> Result<(), String> {
+fn check(detection: &Detection, map: &JointMap, image: &DepthImage) -> Result<(), Unexpected> {
     let Detection { joints, lengths, facing, person, bounds, floor, pixels } = detection;
     let (found, named) = (joints.len(), map.sites.len());
-    unless(found == named, "joints", format_args!("{named}, as the detector names them"), found)?;
+    Unexpected::unless(found == named, "joints", format_args!("{named}, as the detector names them"), found)?;
     let (found, named) = (lengths.len(), map.lengths);
-    unless(found == 0 || found == named, "lengths", format_args!("{named}, as the detector names them"), found)?;
+    let valid = found == 0 || found == named;
+    Unexpected::unless(valid, "lengths", format_args!("{named}, as the detector names them"), found)?;
     for (number, joint) in joints.iter().enumerate() {
         let Some(DetectedJoint { position, sigma, visible }) = joint else { continue };
         let what = format_args!("joints[{number}]");
-        unless(is_place(*position), what, "finite meters", position)?;
-        unless(*sigma > 0.0 && sigma.is_finite(), format_args!("{what}.sigma"), "finite meters > 0", sigma)?;
-        unless((0.0..=1.0).contains(visible), format_args!("{what}.visible"), "0 to 1", visible)?;
+        Unexpected::unless(is_place(*position), what, "finite meters", position)?;
+        let valid = *sigma > 0.0 && sigma.is_finite();
+        Unexpected::unless(valid, format_args!("{what}.sigma"), "finite meters > 0", sigma)?;
+        Unexpected::unless((0.0..=1.0).contains(visible), format_args!("{what}.visible"), "0 to 1", visible)?;
     }
     for length in lengths.as_flattened() {
-        unless(*length > 0.0 && length.is_finite(), "lengths", "finite numbers > 0", length)?;
+        Unexpected::unless(*length > 0.0 && length.is_finite(), "lengths", "finite numbers > 0", length)?;
     }
     let valid = !person.is_nan() && !facing.is_some_and(f64::is_nan);
-    unless(valid, "person and facing", "log odds", "no number")?;
+    Unexpected::unless(valid, "person and facing", "log odds", "no number")?;
     let valid = is_place(bounds.mins) && is_place(bounds.maxs);
-    unless(valid, "bounds", "finite meters", format_args!("{bounds:?}"))?;
+    Unexpected::unless(valid, "bounds", "finite meters", format_args!("{bounds:?}"))?;
     let valid = floor.is_none_or(|floor| floor.normal.is_finite() && floor.offset.is_finite());
-    unless(valid, "floor", "finite numbers", format_args!("{floor:?}"))?;
+    Unexpected::unless(valid, "floor", "finite numbers", format_args!("{floor:?}"))?;
     let (most, below) = (pixels.iter().max().copied().unwrap_or_default(), image.pixels.len());
-    unless(pixels.is_empty() || most < below, "pixels", format_args!("indices below {below}"), most)
-}
-
-/// Rejects a value that is not valid; the text is made only then.
-fn unless(valid: bool, what: impl Display, expected: impl Display, found: impl Display) -> Result<(), String> {
-    if valid { Ok(()) } else { Err(format!("{what}: expected {expected}, found {found}")) }
+    Unexpected::unless(pixels.is_empty() || most < below, "pixels", format_args!("indices below {below}"), most)
 }

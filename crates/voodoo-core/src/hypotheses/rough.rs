@@ -72,7 +72,7 @@ impl RoughSearch {
             }
         }
         sample.subsample(ROUGH_SAMPLE);
-        reset(others, sample.len(), f32::INFINITY);
+        reset(others, sample.weights.len(), f32::INFINITY);
         let (body, poses) = (&at.objective.context.model.body, at.objective.poses);
         for limb in (0..poses.len()).filter(|limb| at.chain.limbs().all(|own| own != *limb)) {
             explain(body, limb, poses, &sample.points, others, distances);

@@ -49,7 +49,7 @@ impl Unexplained {
     /// Writes the unexplained points within `reach` meters of a position to `near`.
     pub(super) fn near(&self, place: Vec3, reach: f64, near: &mut WeightedPoints) {
         near.clear();
-        for index in 0..self.points.len() {
+        for index in 0..self.points.weights.len() {
             let (point, weight) = self.points.get(index);
             if (point - place).length() < reach {
                 near.push(point.to_array().map(|value| value as f32), weight);
@@ -102,7 +102,7 @@ mod tests {
             let arm = near.total();
             assert!(hand > 20.0 && arm > 0.95 * all && arm > 1.5 * hand, "hand: {hand}, arm: {arm}, all: {all}");
             unexplained.near(root - 2.0 * (end - root), 0.15, &mut near);
-            assert!(near.len() == 0);
+            assert!(near.weights.is_empty());
         });
     }
 }

@@ -120,7 +120,7 @@ impl Aabb {
     }
 
     /// The smallest box that contains both.
-    pub(crate) fn union(self, other: Self) -> Self {
+    pub fn union(self, other: Self) -> Self {
         Self { mins: self.mins.min(other.mins), maxs: self.maxs.max(other.maxs) }
     }
 
@@ -137,7 +137,7 @@ impl Aabb {
 
     /// Lengths of the sides.
     #[inline]
-    pub(crate) fn extents(&self) -> Vec3 {
+    pub fn extents(&self) -> Vec3 {
         self.maxs - self.mins
     }
 

@@ -42,13 +42,5 @@ pub fn euler_angles(quaternion: &[f64; 4], order: [usize; 3]) -> [f64; 3] {
         (half_sum + half_difference, half_sum - half_difference)
     };
     let angles = if proper { [first, middle, third] } else { [sign * first, middle - PI / 2.0, third] };
-    angles.map(|angle| {
-        if angle > PI {
-            angle - 2.0 * PI
-        } else if angle < -PI {
-            angle + 2.0 * PI
-        } else {
-            angle
-        }
-    })
+    angles.map(|angle| if angle.abs() > PI { angle - (2.0 * PI).copysign(angle) } else { angle })
 }

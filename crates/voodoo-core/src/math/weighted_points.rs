@@ -12,11 +12,6 @@ pub(crate) struct WeightedPoints {
 }
 
 impl WeightedPoints {
-    /// Number of points.
-    pub(crate) fn len(&self) -> usize {
-        self.points.len()
-    }
-
     /// Removes all points and keeps the memory.
     pub(crate) fn clear(&mut self) {
         self.points.clear();
@@ -56,7 +51,7 @@ impl WeightedPoints {
 
     /// Reduces the points to approximately `most`, evenly, and keeps their total weight.
     pub(crate) fn subsample(&mut self, most: usize) {
-        let count = self.len();
+        let count = self.weights.len();
         if count <= most {
             return;
         }
@@ -81,7 +76,7 @@ mod tests {
         let mut all = WeightedPoints::default();
         (0..1000).for_each(|index| all.push([index as f32, 0.0, 0.0], 2.0));
         all.subsample(70);
-        assert_eq!(all.len(), 70);
+        assert_eq!(all.weights.len(), 70);
         assert!((all.total() - 2000.0).abs() < 1e-9);
         for index in 1..70 {
             let step = all.get(index).0.x - all.get(index - 1).0.x;
@@ -99,7 +94,7 @@ mod tests {
         let mut copy = WeightedPoints::default();
         copy.extend(&points, &[0.7_f32]);
         copy.extend(&points, &[0.7_f32]);
-        assert_eq!(copy.len(), 2);
+        assert_eq!(copy.weights.len(), 2);
         assert_eq!((copy.points.x[1], copy.weights[1]), (0.1, f64::from(0.7_f32)));
     }
 }

@@ -70,7 +70,7 @@ impl Trials {
         sample.clear();
         sample.extend(&candidates.points, &candidates.weight);
         sample.subsample(ROUGH_SAMPLE);
-        reset(nearest, sample.len(), f32::INFINITY);
+        reset(nearest, sample.weights.len(), f32::INFINITY);
         for limb in 0..poses.len() {
             explain(&context.model.body, limb, poses, &sample.points, nearest, distances);
         }

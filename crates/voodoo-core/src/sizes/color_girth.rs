@@ -76,9 +76,7 @@ impl ColorGirths {
                     model.body.change_tip(limb, longer.clamp(TIP_FACTORS[0], TIP_FACTORS[1]));
                 }
                 let system = system(&model.body.limbs()[limb].shape, edges());
-                if !system.is_empty() {
-                    start_girth(&mut self.limbs, limb, &system, 1.0, &mut model.body, &mut poses[limb]);
-                }
+                start_girth(&mut self.limbs, limb, &system, 1.0, &mut model.body, &mut poses[limb]);
             }
         }
     }

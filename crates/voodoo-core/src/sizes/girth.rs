@@ -102,13 +102,12 @@ impl GirthSystem {
         self.add(shape, edge.foot, edge.side, wider, edge.weight * kernel(wider) / (EDGE_SIGMA * EDGE_SIGMA));
     }
 
-    /// Whether nothing was added.
-    pub(super) fn is_empty(&self) -> bool {
-        self.h.trace() <= 0.0
-    }
-
-    /// Eliminates the shift, which is `so_far` from its mean and has the standard deviation `sigma`, meters.
+    /// Eliminates the shift, which is `so_far` from its mean and has the standard deviation `sigma`, meters. `None` if nothing was
+    /// added.
     fn without_shift(&self, sigma: f64, so_far: Vector2<f64>) -> Option<WithoutShift> {
+        if self.h.trace() <= 0.0 {
+            return None;
+        }
         let loose = 1.0 / (sigma * sigma);
         let inverse = (self.h.fixed_view::<2, 2>(0, 0) + Matrix2::identity() * loose).try_inverse()?;
         let mixed = self.h.fixed_view::<3, 2>(2, 0);
@@ -257,9 +256,6 @@ impl Girth {
         kept: Matrix3<f64>,
         prior: &GirthPrior,
     ) -> Option<[f64; 4]> {
-        if system.is_empty() {
-            return None;
-        }
         let own = system.without_shift(axis_sigma, Vector2::zeros())?;
         let (alike, remembered, before) = (ALIKE / frames, 1.0 - frames / REMEMBERED, self.changes());
         let information = (own.information + kept) / alike;

@@ -7,7 +7,7 @@ mod reported;
 use crate::association::contour::edges;
 use crate::body::{Body, Model, Pair};
 use crate::config::Config;
-use crate::detect::{Detected, JointMap};
+use crate::detect::JointMap;
 use crate::fit::{CONTOUR_FROM, Fit, Setting};
 use crate::math::{Pose, Vec3};
 use crate::solver::{Gate, LENGTH_INFORMATION};
@@ -37,10 +37,11 @@ pub(crate) enum Start {
     Detected,
 }
 
-/// Estimates of the sizes, and whether the next frame fits them.
+/// Estimates of the sizes.
 #[derive(Debug, Default)]
 pub(crate) struct Sizes {
-    open: bool,
+    /// Whether the next frame fits the sizes.
+    pub open: bool,
     /// Whether the pose was not set exactly, so that it is fitted before the girths are, and the sizes were found with it.
     pub rough: bool,
     /// The body as it was set, before frames changed its sizes; `None` where these are known, so that no frame changes them.
@@ -55,7 +56,7 @@ pub(crate) struct Sizes {
     stretched: Vec<f64>,
     change: Vec<f64>,
     pull: Vec<f64>,
-    /// Lengths reported by detections of an auto-initialized body.
+    /// Lengths reported by detections of an auto-initialized body: its lengths are pulled towards the mean of all reports.
     pub reported: ReportedLengths,
 }
 
@@ -73,19 +74,6 @@ impl Sizes {
         if config.fit_lengths {
             self.follow_lengths(model);
         }
-    }
-
-    /// Updates the reported lengths with a detection if the body was auto-initialized: lengths are pulled towards the mean of all
-    /// reports.
-    pub(crate) fn update(&mut self, detected: Detected) {
-        if self.rough {
-            self.reported.update(detected);
-        }
-    }
-
-    /// Whether the sizes have yet to be fitted and the pose has to be fitted first.
-    pub(crate) fn wait_for_pose(&self) -> bool {
-        self.open && self.rough
     }
 
     /// Standard deviation of the mean radius of a limb, meters; NaN where it was given.
@@ -121,17 +109,9 @@ impl Sizes {
 
     /// Fits the sizes to the first frame after a reset, whose pose is known.
     pub(crate) fn initialize(&mut self, setting: Setting, model: &mut Model, poses: &mut [Pose], fit: &mut Fit) {
-        if !self.open {
+        if !std::mem::take(&mut self.open) || !setting.config.fit_girths {
             return;
         }
-        self.open = false;
-        if setting.config.fit_girths {
-            self.fit_girths(setting, model, poses, fit);
-            self.color_girths.start(setting, model, poses, fit);
-        }
-    }
-
-    fn fit_girths(&mut self, setting: Setting, model: &mut Model, poses: &mut [Pose], fit: &mut Fit) {
         let mut edges_found = Vec::new();
         let share = if self.rough { FOUND_SHARE } else { 1.0 };
         for _ in 0..GIRTH_STEPS {
@@ -162,6 +142,7 @@ impl Sizes {
             self.girths.iter_mut().for_each(Girth::discount);
         }
         self.set_radius_sigmas(&model.body, fit);
+        self.color_girths.start(setting, model, poses, fit);
     }
 
     /// Finds the depth contour of a frame in which the body was fitted at `poses`, from which sizes are estimated, and refines the

@@ -38,7 +38,7 @@ impl LengthEstimate {
 
 impl ReportedLengths {
     /// Updates the estimates with the lengths of a detection and their relative standard deviations.
-    pub(super) fn update(&mut self, detected: Detected) {
+    pub(crate) fn update(&mut self, detected: Detected) {
         let (Self(lengths), reported) = (self, &detected.detection.lengths);
         lengths.resize(lengths.len().max(reported.len()), LengthEstimate::default());
         lengths.iter_mut().zip(reported).for_each(|(known, reported)| known.update(*reported));

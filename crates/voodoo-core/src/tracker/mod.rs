@@ -165,10 +165,10 @@ impl BodyTracker {
         !matches!(self.estimate.status, Status::Lost | Status::Searching)
     }
 
-    /// Updates the sizes with the detection of this frame, if there is one.
+    /// Updates the reported lengths of an auto-initialized body with the detection of this frame, if there is one.
     fn update_sizes(&mut self) {
-        if let Some(detected) = self.relocalizer.detected() {
-            self.sizes.update(detected);
+        if let Some(detected) = self.relocalizer.detected().filter(|_| self.sizes.rough) {
+            self.sizes.reported.update(detected);
         }
     }
 
@@ -302,7 +302,7 @@ impl BodyTracker {
         if config.hypotheses && whole_body && known {
             steps += hypotheses.branch.follow(setting.with_model(model), fit);
         }
-        if sizes.wait_for_pose() {
+        if sizes.open && sizes.rough {
             steps += fit.run(setting.with_model(model), predicted, poses);
         }
         sizes.initialize(setting, model, poses, fit);
