@@ -18,7 +18,7 @@ impl Body {
             limb.shape = limb
                 .shape
                 .stretched(factor, [factor; 4])
-                .map_err(|source| BodyError::Shape { key: format!("limbs.{}", limb.name), source })?;
+                .map_err(|error| Unexpected { what: format!("limbs.{}.{}", limb.name, error.what), ..error })?;
             if let Some((_, joint)) = &mut limb.parent {
                 joint.parent_from_joint = scale_pose(&joint.parent_from_joint);
                 joint.limb_from_joint = scale_pose(&joint.limb_from_joint);
