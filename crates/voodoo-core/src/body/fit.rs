@@ -343,11 +343,7 @@ fn twist_towards(rotation: Quat, local: Vec3, world: Vec3) -> Quat {
 
 /// Whether the points are not collinear: the middle eigenvalue of their scatter is above zero.
 fn spans_a_plane(points: impl Iterator<Item = Vec3> + Clone) -> bool {
-    let count = points.clone().count() as f64;
-    if count < 3.0 {
-        return false;
-    }
-    let mean = points.clone().sum::<Vec3>() / count;
+    let mean = points.clone().sum::<Vec3>() / points.clone().count() as f64;
     let scatter = points.fold(Mat3::ZERO, |sum, point| {
         let d = point - mean;
         sum + Mat3::from_cols(d * d.x, d * d.y, d * d.z)
