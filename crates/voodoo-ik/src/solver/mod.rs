@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use super::goal::{Goal, level_cost};
 use super::image::Criterion;
-use super::linear::{Damped, Taken};
+use super::linear::LinearSystem;
 use super::model::{ChainModel, Kinematics};
 use voodoo_core::math::{Pose, refill, reset};
 
@@ -105,18 +105,6 @@ struct Levels {
     before: Vec<f64>,
     /// Best residual of the levels that are already solved.
     best: Vec<f64>,
-}
-
-/// The linear system of one level, and its solution.
-#[derive(Clone, Debug, Default)]
-struct LinearSystem {
-    taken: Taken,
-    damped: Damped,
-    jacobian: Vec<f64>,
-    projected: Vec<f64>,
-    residual: Vec<f64>,
-    target: Vec<f64>,
-    part: Vec<f64>,
 }
 
 /// What is to be solved.

@@ -45,7 +45,7 @@ impl IkSolver {
             }
             self.linear.projected.clone_from(&self.linear.jacobian);
             self.linear.projected.chunks_exact_mut(n).for_each(|row| self.linear.taken.project(row));
-            self.linear.damped.solve(&self.linear.projected, &self.linear.target, damping, &mut self.linear.part);
+            self.linear.solve(damping);
             if !self.add_part(problem, level, angles) {
                 break;
             }
