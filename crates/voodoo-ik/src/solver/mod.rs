@@ -173,29 +173,27 @@ impl IkSolver {
         let (image, active) = (phase == count, count.min(phase + 1));
         let mut nudged = false;
         let mut idle = 0;
-        let mut rest = false;
-        for step in 0..options.steps {
+        let mut rest = (0..options.steps).any(|step| {
             let reached = self.here.cost[..active].iter().all(|cost| cost.sqrt() < options.tolerance);
             if reached && (!image || self.here.h <= 0.0) {
-                rest = true;
-                break;
+                return true;
             }
             self.report.steps += 1;
             let before = self.here.h;
             let moved = self.step(problem, phase, slack, angles);
             idle = if image && before - self.here.h < LEAST_FALL * before { idle + 1 } else { 0 };
             if moved >= options.still && idle < STALLED_STEPS {
-                continue;
+                return false;
             }
             let stuck = !image && self.here.cost[phase].sqrt() > options.tolerance;
             if nudged || !stuck || step + 1 == options.steps {
-                rest = true;
-                break;
+                return true;
             }
             // Either a saddle (a stretched arm whose hand is to come nearer) or the optimum: a perturbation decides which.
             nudged = true;
             self.nudge(problem, angles);
-        }
+            false
+        });
         if nudged && self.worse_than_saved() {
             angles.copy_from_slice(&self.saved_angles);
             self.evaluate_here(problem, angles);
