@@ -365,13 +365,12 @@ fn fisheye_inverse(k: &[f64; 4], at: [f64; 2], domain: f64) -> Option<[f64; 2]> 
         } else {
             high = angle
         }
-        let next = angle - (value - target) / slope;
-        let next = if next > low && next < high { next } else { 0.5 * (low + high) };
-        if (next - angle).abs() <= f64::EPSILON * angle {
-            angle = next;
+        let before = angle;
+        let next = before - (value - target) / slope;
+        angle = if next > low && next < high { next } else { 0.5 * (low + high) };
+        if (angle - before).abs() <= f64::EPSILON * before {
             break;
         }
-        angle = next;
     }
     let scale = angle.tan() / target;
     (scale > 0.0 && scale.is_finite()).then(|| at.map(|value| value * scale))
