@@ -85,6 +85,8 @@ pub struct SurfacePoint {
 /// let near = forearm.closest_point(Vec3::new(0.2, 0.0, 0.1));
 /// assert_eq!(near.region, Region::Side);
 /// assert!((near.signed_distance - 0.1575).abs() < 1e-3);
+/// let refused = TaperedEllipticCylinder::new(-0.25, 0.05, 0.05, 0.03, 0.03).unwrap_err();
+/// assert_eq!(refused.to_string(), "length: expected 0.000001 to 1000 m, found -0.25");
 /// # Ok::<(), voodoo_core::Unexpected>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
