@@ -2,8 +2,6 @@
 
 use std::fmt::Display;
 
-use crate::shape::ShapeError;
-
 /// What is not as expected: an entry of a body, a number of a camera, a parameter, or a measurement.
 ///
 /// ```
@@ -65,14 +63,6 @@ pub enum BodyError {
     /// A value outside its domain, or a human name that contradicts the others.
     #[error(transparent)]
     Value(#[from] Unexpected),
-    /// A shape that is not a valid solid.
-    #[error("{key}: {source}")]
-    Shape {
-        /// Key of the entry.
-        key: String,
-        /// The error of the shape.
-        source: ShapeError,
-    },
 }
 
 /// Why the tracker rejected a call. The tracker is unchanged afterwards.

@@ -197,7 +197,7 @@ pub use observation::picture::{ColorImage, ColorPixels};
 pub use people::one::Tracker;
 pub use people::{People, PeopleOptions, Refusal};
 pub use regions::RegionLine;
-pub use shape::{Region, ShapeError, SurfaceBatch, SurfacePoint, TaperedEllipticCylinder};
+pub use shape::{Region, SurfaceBatch, SurfacePoint, TaperedEllipticCylinder};
 pub use toml::Value;
 pub use tracker::BodyTracker;
 pub use tracker::estimate::{Estimate, LimbStatus, SourceReport, Status};

@@ -69,59 +69,65 @@ pub(super) fn largest(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |most, value| most.max(value.abs()))
 }
 
-/// Working memory of [`Damped::solve`].
+/// The linear system of one level, and its solution.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Damped {
+pub(super) struct LinearSystem {
+    pub(super) taken: Taken,
+    pub(super) jacobian: Vec<f64>,
+    pub(super) projected: Vec<f64>,
+    pub(super) residual: Vec<f64>,
+    pub(super) target: Vec<f64>,
+    pub(super) part: Vec<f64>,
     h: Vec<f64>,
     z: Vec<f64>,
 }
 
-impl Damped {
-    /// Computes `x = A^T (A A^T + damping I)^-1 b = (A^T A + damping I)^-1 A^T b` with the smaller of the two systems; zero for a
-    /// zero matrix.
-    pub(crate) fn solve(&mut self, a: &[f64], b: &[f64], damping: f64, x: &mut [f64]) {
+impl LinearSystem {
+    /// Computes the part `x = A^T (A A^T + damping I)^-1 b = (A^T A + damping I)^-1 A^T b` of the projected Jacobian `A` and the
+    /// target `b` with the smaller of the two systems; zero for a zero matrix.
+    pub(super) fn solve(&mut self, mut damping: f64) {
+        let Self { projected: a, target: b, part: x, h, z, .. } = self;
         let (rows, n) = (b.len(), x.len());
         let size = rows.min(n);
-        let mut damping = damping;
         x.fill(0.0);
         // Rounding can make a nearly singular matrix indefinite; more damping resolves that.
         for _ in 0..6 {
-            reset(&mut self.h, size * size, 0.0);
-            self.z.clear();
+            reset(h, size * size, 0.0);
+            z.clear();
             if rows <= n {
                 for i in 0..rows {
                     let row = &a[i * n..(i + 1) * n];
                     for j in 0..=i {
-                        self.h[i * size + j] = dot(row, &a[j * n..(j + 1) * n]);
+                        h[i * size + j] = dot(row, &a[j * n..(j + 1) * n]);
                     }
                 }
-                self.z.extend_from_slice(b);
+                z.extend_from_slice(b);
             } else {
-                self.z.resize(n, 0.0);
-                for (row, b) in a.chunks_exact(n).zip(b) {
+                z.resize(n, 0.0);
+                for (row, b) in a.chunks_exact(n).zip(&*b) {
                     for i in 0..n {
                         if row[i] != 0.0 {
-                            self.h[i * n..=i * n + i].iter_mut().zip(row).for_each(|(h, value)| *h += row[i] * value);
-                            self.z[i] += row[i] * b;
+                            h[i * n..=i * n + i].iter_mut().zip(row).for_each(|(h, value)| *h += row[i] * value);
+                            z[i] += row[i] * b;
                         }
                     }
                 }
             }
-            let trace: f64 = (0..size).map(|i| self.h[i * size + i]).sum();
+            let trace: f64 = (0..size).map(|i| h[i * size + i]).sum();
             if trace.is_nan() || trace <= 0.0 {
                 return;
             }
             let floor = 1e-14 * trace;
             for i in 0..size {
-                self.h[i * size + i] += damping.max(floor);
+                h[i * size + i] += damping.max(floor);
             }
-            if solve_in_place(&mut self.h, &mut self.z, size) {
+            if solve_in_place(h, z, size) {
                 if rows <= n {
-                    for (row, z) in a.chunks_exact(n).zip(&self.z) {
+                    for (row, z) in a.chunks_exact(n).zip(&*z) {
                         x.iter_mut().zip(row).for_each(|(x, value)| *x += z * value);
                     }
                 } else {
-                    x.copy_from_slice(&self.z);
+                    x.copy_from_slice(z);
                 }
                 return;
             }

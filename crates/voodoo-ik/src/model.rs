@@ -70,15 +70,12 @@ impl ChainModel {
     /// With `free_root`, position and rotation vector of the first limb in the base frame are six unknowns. Without it, the base
     /// frame is that of the first limb's parent, or of the limb itself where the body has no parent of it.
     pub fn new(body: &Body, limbs: &[usize], free_root: bool) -> Result<Self, BodyError> {
-        let all: Vec<usize> = (0..body.limbs().len()).collect();
-        let mut chosen = if limbs.is_empty() { all } else { limbs.to_vec() };
-        chosen.sort_unstable();
-        chosen.dedup();
+        if let Some(unknown) = limbs.iter().find(|limb| **limb >= body.limbs().len()) {
+            return Err(Unexpected::new("limbs", "indices of limbs", unknown).into());
+        }
         let mut model = Self::default();
-        for limb in chosen {
-            let Some(description) = body.limbs().get(limb) else {
-                return Err(Unexpected::new("limbs", "indices of limbs", limb).into());
-            };
+        let is_chosen = |limb: &usize| limbs.is_empty() || limbs.contains(limb);
+        for (limb, description) in body.limbs().iter().enumerate().filter(|(limb, _)| is_chosen(limb)) {
             model.add(limb, description, free_root)?;
         }
         Ok(model)

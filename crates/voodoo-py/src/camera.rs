@@ -11,8 +11,6 @@ use crate::arrays::{Array, array, limb_poses, pose, rows};
 use crate::body::PyBody;
 use crate::errors::{CameraError, raise, wrong_argument};
 
-type Arguments = (usize, usize, [f64; 4], String, Vec<f64>);
-
 #[doc = stub!("Camera")]
 #[pyclass(name = "Camera", module = "voodoo._core", frozen)]
 pub struct PyCamera(Arc<Camera>);
@@ -27,7 +25,7 @@ impl PyCamera {
         Ok(Self(Arc::new(camera)))
     }
 
-    fn __getnewargs__(&self) -> Arguments {
+    fn __getnewargs__(&self) -> (usize, usize, [f64; 4], String, Vec<f64>) {
         let ([fx, fy], [cx, cy], lens) = (self.0.focal(), self.0.center(), self.0.lens());
         let coefficients = lens.coefficients().to_vec();
         (self.0.width(), self.0.height(), [fx, fy, cx, cy], lens.model().to_owned(), coefficients)

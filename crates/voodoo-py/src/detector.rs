@@ -25,7 +25,11 @@ pub(crate) fn detector(given: &Bound<'_, PyAny>) -> PyResult<Option<Box<dyn Dete
         return Ok(None);
     }
     if given.cast::<PyString>().is_ok_and(|word| word == "shipped") {
-        return Ok(shipped());
+        #[cfg(feature = "detect")]
+        return Ok(Some(Box::new(voodoo_detect::Detector::new())));
+        // A build without a detector.
+        #[cfg(not(feature = "detect"))]
+        return Ok(None);
     }
     #[cfg(feature = "detect")]
     if let Ok(detector) = given.cast::<crate::detect::PyDetector>() {
@@ -36,14 +40,6 @@ pub(crate) fn detector(given: &Bound<'_, PyAny>) -> PyResult<Option<Box<dyn Dete
     }
     let expected = "\"shipped\", None, a voodoo.Detector, or an object with joints and detect(image)";
     Err(ConfigError::new_err(wrong("detector", expected, given)))
-}
-
-/// The detector that ships with the library, if this build contains it.
-fn shipped() -> Option<Box<dyn Detect>> {
-    #[cfg(feature = "detect")]
-    return Some(Box::new(voodoo_detect::Detector::new()));
-    #[cfg(not(feature = "detect"))]
-    None
 }
 
 /// Counts and reports that a detector failed in a step, which continued without it: a warning, or KeyboardInterrupt and the like

@@ -44,10 +44,6 @@ impl PyFrame {
     pub(crate) fn color_views<'py>(&self, py: Python<'py>) -> PyResult<ColorViews<'py, '_>> {
         self.colors.iter().map(|data| Ok((data.pixels.extract(py)?, data))).collect()
     }
-
-    fn source(&mut self, name: &str) -> u16 {
-        number(&mut self.sources, name)
-    }
 }
 
 #[pymethods]
@@ -74,7 +70,7 @@ impl PyFrame {
             world_from_sensor: pose("world_from_sensor", world_from_sensor)?,
             weight,
             scope: if on_body { Scope::Body } else { Scope::Free },
-            source: self.source(source),
+            source: number(&mut self.sources, source),
         };
         self.clouds.push((array, cloud, limb));
         Ok(())
@@ -105,7 +101,7 @@ impl PyFrame {
             meters_per_unit,
             world_from_sensor: pose("world_from_sensor", world_from_sensor)?,
             weight,
-            source: self.source(source),
+            source: number(&mut self.sources, source),
         };
         self.images.push(data);
         Ok(())
@@ -132,7 +128,7 @@ impl PyFrame {
             camera,
             world_from_sensor: pose("world_from_sensor", world_from_sensor)?,
             stamp: stamp.map_or(Ok(self.stamp), arguments::stamp)?,
-            source: self.source(source),
+            source: number(&mut self.sources, source),
         };
         self.colors.push(data);
         Ok(())
@@ -148,7 +144,7 @@ impl PyFrame {
         #[pyo3(from_py_with = arguments::bias)] bias: f64,
         source: &str,
     ) -> PyResult<()> {
-        let (position, source) = (vector("position", position)?, self.source(source));
+        let (position, source) = (vector("position", position)?, number(&mut self.sources, source));
         self.positions.push((site, PositionRelation { site: 0, position, weight, bias, source }));
         Ok(())
     }
@@ -165,7 +161,7 @@ impl PyFrame {
         source: &str,
     ) -> PyResult<()> {
         let (origin, direction) = (vector("origin", origin)?, vector("direction", direction)?);
-        let source = self.source(source);
+        let source = number(&mut self.sources, source);
         self.rays.push((site, RayRelation { site: 0, origin, direction, weight, bias, source }));
         Ok(())
     }
@@ -179,7 +175,7 @@ impl PyFrame {
         #[pyo3(from_py_with = arguments::weight)] weight: f64,
         source: &str,
     ) -> PyResult<()> {
-        let source = self.source(source);
+        let source = number(&mut self.sources, source);
         let position = |(name, position): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
             let site = arguments::site(&name)?;
             let position = vector(&format!("joints[{site}]"), &position)?;
@@ -216,7 +212,7 @@ impl PyFrame {
     ) -> PyResult<usize> {
         let mut count = 0;
         for ray in rays.iter().filter(|ray| ray.trust >= min_trust) {
-            let (site, source, bias) = (ray.site.clone(), self.source(&ray.source), ray.bias);
+            let (site, source, bias) = (ray.site.clone(), number(&mut self.sources, &ray.source), ray.bias);
             let (origin, direction) = (ray.origin.0, ray.direction.0);
             let weight = |sigma: f64| {
                 unless(sigma > 0.0 && sigma.is_finite(), "sigma", "finite meters > 0", sigma)?;

@@ -153,11 +153,8 @@ impl PyChain {
         let views: Vec<&SilhouetteView> = views.iter().map(|view| &view.0).collect();
         let trunk = self.trunk(base, &others)?;
         let mut gradient = vec![0.0; self.model.freedoms()];
-        let h = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk }.evaluate(
-            &self.model,
-            &at,
-            &mut gradient,
-        );
+        let criterion = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk };
+        let h = criterion.evaluate(&self.model, &at, &mut gradient);
         Ok((h, frozen(py, gradient, &[self.model.freedoms()])?))
     }
 

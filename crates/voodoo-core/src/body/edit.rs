@@ -2,7 +2,7 @@
 
 use super::{Body, Joint, Limb, Site};
 use crate::error::{BodyError, Unexpected};
-use crate::math::{Pose, Vec3};
+use crate::math::Vec3;
 use crate::shape::TaperedEllipticCylinder;
 
 /// Limbs of equal length: a left-right pair, or a single limb of the trunk.
@@ -12,16 +12,15 @@ impl Body {
     /// The body with all lengths multiplied by `factor`.
     pub fn scaled(&self, factor: f64) -> Result<Self, BodyError> {
         Unexpected::unless(factor.is_finite() && factor > 0.0, "factor", "a finite factor above zero", factor)?;
-        let scale_pose = |pose: &Pose| Pose::from_parts(pose.translation * factor, pose.rotation);
         let mut body = self.clone();
         for limb in &mut body.limbs {
             limb.shape = limb
                 .shape
                 .stretched(factor, [factor; 4])
-                .map_err(|source| BodyError::Shape { key: format!("limbs.{}", limb.name), source })?;
+                .map_err(|error| Unexpected { what: format!("limbs.{}.{}", limb.name, error.what), ..error })?;
             if let Some((_, joint)) = &mut limb.parent {
-                joint.parent_from_joint = scale_pose(&joint.parent_from_joint);
-                joint.limb_from_joint = scale_pose(&joint.limb_from_joint);
+                joint.parent_from_joint.translation *= factor;
+                joint.limb_from_joint.translation *= factor;
                 joint.semi_axes = joint.semi_axes.map(|axis| axis * factor);
             }
         }

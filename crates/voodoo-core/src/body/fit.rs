@@ -3,7 +3,7 @@
 use super::{Body, Joint, JointKind};
 use crate::body::kinematics::joint_turn;
 use crate::error::{TrackError, Unexpected};
-use crate::math::{Mat3, Moments, Pose, Quat, Vec3, is_place};
+use crate::math::{Aabb, Mat3, Moments, Pose, Quat, Vec3, is_place};
 
 /// A hinge bent by less than this does not determine its axis: sine of the angle between its limbs.
 const BENT: f64 = 0.3;
@@ -207,16 +207,10 @@ impl Body {
         if let Some((axis, hinge)) = self.hinge_axis(limb, positions) {
             rotation = twist_towards(rotation, axis, hinge);
         }
-        let translation = match anchor {
-            Some((local, center)) => center - rotation * local,
-            None if !pairs.is_empty() => {
-                let count = pairs.len() as f64;
-                let local = pairs.iter().map(|pair| pair.0).sum::<Vec3>() / count;
-                mean - rotation * local
-            }
-            None => prior.translation,
-        };
-        Pose::from_parts(translation, rotation.normalize())
+        // A root, which no joint holds, is held by the middle of its landmarks.
+        let own_middle = || pairs.iter().map(|pair| pair.0).sum::<Vec3>() / pairs.len().max(1) as f64;
+        let (local, center) = anchor.unwrap_or_else(|| (own_middle(), mean));
+        Pose::from_parts(center - rotation * local, rotation.normalize())
     }
 
     /// The axis of a hinge at the distal end of a limb: in the limb frame, and in the world as the bent child determines it.
@@ -245,15 +239,12 @@ impl Body {
             return;
         }
         let local: Vec<(Vec3, Vec3)> = pairs.iter().map(|(x, p)| (*x, pose.inverse_transform_point(*p))).collect();
-        let spread = |axis: usize, which: fn(&(Vec3, Vec3)) -> Vec3| {
-            let values = local.iter().map(|pair| which(pair)[axis]);
-            values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)
-        };
+        let modeled = Aabb::from_points(local.iter().map(|pair| pair.0)).extents();
+        let measured = Aabb::from_points(local.iter().map(|pair| pair.1)).extents();
         let shape = self.limbs[limb].shape;
         let ratio = |axis: usize, enough: f64| {
-            let (modeled, measured) = (spread(axis, |pair| pair.0), spread(axis, |pair| pair.1));
-            if modeled > enough && measured > 0.0 {
-                (measured / modeled).clamp(1.0 / MOST_STRETCH, MOST_STRETCH)
+            if modeled[axis] > enough && measured[axis] > 0.0 {
+                (measured[axis] / modeled[axis]).clamp(1.0 / MOST_STRETCH, MOST_STRETCH)
             } else {
                 1.0
             }
@@ -352,11 +343,7 @@ fn twist_towards(rotation: Quat, local: Vec3, world: Vec3) -> Quat {
 
 /// Whether the points are not collinear: the middle eigenvalue of their scatter is above zero.
 fn spans_a_plane(points: impl Iterator<Item = Vec3> + Clone) -> bool {
-    let count = points.clone().count() as f64;
-    if count < 3.0 {
-        return false;
-    }
-    let mean = points.clone().sum::<Vec3>() / count;
+    let mean = points.clone().sum::<Vec3>() / points.clone().count() as f64;
     let scatter = points.fold(Mat3::ZERO, |sum, point| {
         let d = point - mean;
         sum + Mat3::from_cols(d * d.x, d * d.y, d * d.z)

@@ -13,11 +13,6 @@ const GROWTH: [f64; 5] = [0.84, 0.13, -0.13, -0.23, 0.09];
 /// Highest point above the lowest point of the skeleton of a standing adult, over stature.
 const UPRIGHT: f64 = 0.98;
 
-/// Sizes relative to those of an adult of this stature: head, trunk, arms, legs, and the girth of arms and legs.
-fn proportions(stature: f64) -> [f64; 5] {
-    GROWTH.map(|change| 1.0 + change * (GROWN - stature).max(0.0))
-}
-
 impl Body {
     /// The body with the proportions of a person of another stature, and its own overall scale.
     pub(crate) fn with_proportions_of(&self, stature: f64) -> Self {
@@ -26,8 +21,9 @@ impl Body {
 
     /// The body with proportions of one stature changed to those of another.
     fn grown(&self, from: f64, to: f64) -> Self {
-        let [before, after] = [from, to].map(proportions);
-        let [head, trunk, arm, leg, girth] = std::array::from_fn(|index| after[index] / before[index]);
+        // Relative to an adult of the same stature.
+        let size = |stature: f64, change: f64| 1.0 + change * (GROWN - stature).max(0.0);
+        let [head, trunk, arm, leg, girth] = GROWTH.map(|change| size(to, change) / size(from, change));
         let mut body = self.clone();
         for limb in 0..body.limbs.len() {
             let Some(role) = body.roles.limb(limb) else { continue };

@@ -79,7 +79,7 @@ struct Builder {
 
 impl Builder {
     /// Adds a limb whose names begin with `prefix`, mirrored for the right side (`side` = -1, otherwise 1).
-    fn add(&mut self, part: &Part, prefix: &str, side: f64) -> Result<(), BodyError> {
+    fn add(&mut self, part: &Part, prefix: &str, side: f64) -> Result<(), Unexpected> {
         let named = |name: &str| format!("{prefix}{name}");
         let place = |at: Vec3| Vec3::new(at.x, side * at.y, at.z);
         let (name, [start, end], [a0, b0, a1, b1]) = (named(&part.name), part.ends.map(place), part.semi_axes);
@@ -89,8 +89,7 @@ impl Builder {
         let x = (front - along * front.dot(along)).normalize();
         let rotation = Quat::from_mat3(&Mat3::from_cols(x, along.cross(x), along));
         let pose = Pose::from_parts(start, rotation);
-        let shape = TaperedEllipticCylinder::new(length, a0, b0, a1, b1)
-            .map_err(|source| BodyError::Shape { key: format!("limbs.{name}"), source })?;
+        let shape = TaperedEllipticCylinder::new(length, a0, b0, a1, b1)?;
         let joint = |link: &Link| {
             // Of a pair the one on the same side: it was added last.
             let parent = self.limbs.iter().rposition(|limb| split(&limb.name).1 == link.parent)?;

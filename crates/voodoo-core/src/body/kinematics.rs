@@ -5,37 +5,35 @@ use std::ops::Range;
 use nalgebra::Vector6;
 
 use crate::body::{Body, Joint, JointKind, Limb};
-use crate::math::{Pose, Quat, Vec3, refill};
+use crate::math::{Pose, Quat, Vec3, refill, reset};
 
 /// Layout of the unknowns of all limbs' joints in the vector of unknowns; the root has six.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Chain {
-    /// First unknown of each limb.
-    pub start: Vec<usize>,
-    /// Number of unknowns of each limb.
-    pub count: Vec<usize>,
+    /// First unknown of each limb; and the number of all unknowns, which would be the first one of a next limb.
+    start: Vec<usize>,
     /// Parent of each limb; the root is its own.
     pub parent: Vec<usize>,
-    /// Number of all unknowns.
-    pub freedoms: usize,
 }
 
 impl Chain {
     /// Lays out the unknowns of `body`.
     pub(crate) fn layout(&mut self, body: &Body) {
-        refill(&mut self.count, body.limbs().iter().map(freedoms));
         refill(&mut self.parent, (0..body.limbs().len()).map(|limb| body.parent(limb).unwrap_or(0)));
-        self.start.clear();
-        self.freedoms = 0;
-        for count in &self.count {
-            self.start.push(self.freedoms);
-            self.freedoms += count;
+        reset(&mut self.start, 1, 0);
+        for limb in body.limbs() {
+            self.start.push(self.freedoms() + freedoms(limb));
         }
+    }
+
+    /// Number of all unknowns.
+    pub(crate) fn freedoms(&self) -> usize {
+        self.start.last().copied().unwrap_or(0)
     }
 
     /// The unknowns of a limb.
     pub(crate) fn unknowns(&self, limb: usize) -> Range<usize> {
-        self.start[limb]..self.start[limb] + self.count[limb]
+        self.start[limb]..self.start[limb + 1]
     }
 
     /// The limb, its parent, and so on up to the root: the limbs whose unknowns move it.

@@ -94,7 +94,7 @@ impl Body {
     pub fn new(name: impl Into<String>, limbs: Vec<Limb>, sites: Vec<Site>) -> Result<Self, BodyError> {
         let mut body = Self { name: name.into(), limbs, sites, roles: Arc::default() };
         body.check()?;
-        body.roles = Arc::new(Roles::resolve(&body.limbs, &body.sites)?);
+        body.roles = Arc::new(Roles::resolve(&body)?);
         Ok(body)
     }
 

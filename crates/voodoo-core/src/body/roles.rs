@@ -3,7 +3,7 @@
 //! This is the only place in the core that compares names; all other code uses indices. A body without human names has no roles,
 //! and features that need roles are disabled for it.
 
-use super::{Limb, Site};
+use super::{Body, Limb};
 use crate::error::Unexpected;
 
 /// Side of the body, as the person's own left or right; see [`Roles`] for an example.
@@ -151,7 +151,8 @@ impl Roles {
     /// # Errors
     /// [`Unexpected`] when a limb and its joint are named after different sides, or when a joint of an arm or leg does not
     /// follow the preceding one. Detections and statistics of human joints would otherwise be applied to the wrong limbs.
-    pub(super) fn resolve<'a>(limbs: &'a [Limb], sites: &[Site]) -> Result<Self, Unexpected> {
+    pub(super) fn resolve<'a>(body: &'a Body) -> Result<Self, Unexpected> {
+        let (limbs, sites) = (body.limbs(), body.sites());
         let joint_name = |limb: &'a Limb| limb.parent.as_ref().map(|(_, joint)| joint.name.as_str());
         let site = |name: &str| sites.iter().position(|site| site.name == name);
         let roles = Self {
@@ -160,33 +161,27 @@ impl Roles {
             joint_sites: limbs.iter().map(|limb| joint_name(limb).and_then(site)).collect(),
             groups: groups(limbs),
         };
-        roles.check(limbs, sites)?;
-        Ok(roles)
-    }
-
-    fn check(&self, limbs: &[Limb], sites: &[Site]) -> Result<(), Unexpected> {
-        let parent = |limb: usize| limbs[limb].parent.as_ref().map(|(parent, _)| *parent);
         let opposite = |limb: usize, name: &str| {
-            let sides = self.limb(limb).and(Side::of(&limbs[limb].name)).zip(Side::of(name));
+            let sides = roles.limb(limb).and(Side::of(&limbs[limb].name)).zip(Side::of(name));
             sides.is_some_and(|(own, other)| own != other)
         };
-        for (index, limb) in limbs.iter().enumerate() {
-            let (Some((hangs_on, joint)), Some(role)) = (&limb.parent, self.joints[index]) else { continue };
-            let key = format_args!("limbs.{}.joint.name", limb.name);
+        for (index, hangs_on, joint) in body.joints() {
+            let Some(role) = roles.joints[index] else { continue };
+            let key = format_args!("limbs.{}.joint.name", limbs[index].name);
             Unexpected::unless(!opposite(index, &joint.name), key, "a joint of the limb's own side", &joint.name)?;
             // A second joint of the same name belongs to another limb that is attached there.
-            let before = role.before().filter(|_| self.limb_at(role) == Some(index));
-            let Some(before) = before.and_then(|before| self.limb_at(before)) else { continue };
-            let follows = std::iter::successors(Some(*hangs_on), |limb| parent(*limb)).any(|limb| limb == before);
+            let before = role.before().filter(|_| roles.limb_at(role) == Some(index));
+            let Some(before) = before.and_then(|before| roles.limb_at(before)) else { continue };
+            let follows = std::iter::successors(Some(hangs_on), |limb| body.parent(*limb)).any(|limb| limb == before);
             let expected = format_args!("a joint of a limb that hangs on {}", limbs[before].name);
-            Unexpected::unless(follows, key, expected, format_args!("{} on {}", joint.name, limbs[*hangs_on].name))?;
+            Unexpected::unless(follows, key, expected, format_args!("{} on {}", joint.name, limbs[hangs_on].name))?;
         }
         for site in sites {
             let (key, found) = (format_args!("sites.{}.limb", site.name), &limbs[site.limb].name);
             let valid = JointRole::from_name(&site.name).is_none() || !opposite(site.limb, &site.name);
             Unexpected::unless(valid, key, "a limb of the site's own side", found)?;
         }
-        Ok(())
+        Ok(roles)
     }
 
     /// The role of a limb.
@@ -253,7 +248,7 @@ fn groups<'a>(limbs: &'a [Limb]) -> Vec<u16> {
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
-    use crate::body::{Body, HumanModel, Joint};
+    use crate::body::{HumanModel, Joint, Site};
     use crate::error::BodyError;
     use crate::math::{Pose, Vec3};
     use crate::shape::TaperedEllipticCylinder;

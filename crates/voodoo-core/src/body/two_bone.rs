@@ -2,7 +2,7 @@
 //! contradicts the images.
 
 use crate::body::kinematics::{hinge_axis, place};
-use crate::body::{Body, JointKind};
+use crate::body::{Body, Joint, JointKind};
 use crate::math::{Mat3, Pose, Quat, Vec3};
 use crate::observation::frame::Ground;
 
@@ -35,26 +35,22 @@ impl TwoBone {
     pub(crate) fn from_body(body: &Body) -> Vec<Self> {
         let limbs = body.limbs();
         let mut found = Vec::new();
-        for (lower, limb) in limbs.iter().enumerate() {
-            let Some((upper, hinge)) = &limb.parent else { continue };
-            let Some((trunk, ball)) = &limbs[*upper].parent else { continue };
+        for (lower, upper, hinge) in body.joints() {
+            let Some((trunk, ball)) = &limbs[upper].parent else { continue };
             if hinge.kind() != JointKind::Hinge || ball.kind() == JointKind::Hinge {
                 continue;
             }
-            let ends: Vec<usize> = body.children(lower).collect();
+            let ends: Vec<_> = body.joints().filter(|(_, parent, _)| *parent == lower).collect();
             let first = (hinge.parent_from_joint.translation - ball.limb_from_joint.translation).length();
-            let reach = |end: &usize| {
-                let shape = &limbs[*end].shape;
+            let reach = |(end, _, joint): &(usize, usize, &Joint)| {
                 // A foot is perpendicular to the calf: only the component along the calf lengthens the bone.
-                let along = limbs[*end]
-                    .parent
-                    .as_ref()
-                    .map_or(Vec3::Z, |(_, joint)| joint.parent_from_limb_at_rest().rotation * Vec3::Z);
-                GRASP * shape.length() * along.z.max(0.0)
+                let along = joint.parent_from_limb_at_rest().rotation * Vec3::Z;
+                GRASP * limbs[*end].shape.length() * along.z.max(0.0)
             };
-            let second = limb.shape.length() + ends.iter().map(reach).fold(0.0, f64::max);
+            let second = limbs[lower].shape.length() + ends.iter().map(reach).fold(0.0, f64::max);
             let leg = *trunk == 0 && ball.parent_from_joint.translation.z < 0.5 * limbs[0].shape.length();
-            found.push(Self { upper: *upper, lower, ends, lengths: [first, second], leg });
+            let ends = ends.into_iter().map(|(end, ..)| end).collect();
+            found.push(Self { upper, lower, ends, lengths: [first, second], leg });
         }
         found
     }

@@ -50,25 +50,22 @@ impl Lens {
     /// # Errors
     /// [`Unexpected`] when the model is unknown or the number of coefficients does not fit it.
     pub fn from_model(model: &str, coefficients: &[f64]) -> Result<Self, Unexpected> {
-        let counts: (&[usize], &'static str) = match model {
-            "plumb_bob" | "inverse_plumb_bob" => (&[0, 4, 5], "0, 4 or 5 coefficients"),
-            "rational_polynomial" => (&[0, 8, 12, 14], "0, 8, 12 or 14 coefficients"),
-            "equidistant" => (&[0, 4], "0 or 4 coefficients"),
+        let (counts, expected, lens): (&[usize], &'static str, Self) = match model {
+            "plumb_bob" => (&[0, 4, 5], "0, 4 or 5 coefficients", Self::PlumbBob(padded(coefficients))),
+            "inverse_plumb_bob" => (&[0, 4, 5], "0, 4 or 5 coefficients", Self::InversePlumbBob(padded(coefficients))),
+            "rational_polynomial" => {
+                (&[0, 8, 12, 14], "0, 8, 12 or 14 coefficients", Self::Rational(padded(coefficients)))
+            }
+            "equidistant" => (&[0, 4], "0 or 4 coefficients", Self::Fisheye(padded(coefficients))),
             _ => {
                 let expected = "plumb_bob, rational_polynomial, equidistant or inverse_plumb_bob";
                 return Err(Unexpected::new("camera model", expected, format_args!("{model:?}")));
             }
         };
         let found = format_args!("{} for {model}: {coefficients:?}", coefficients.len());
-        Unexpected::unless(counts.0.contains(&coefficients.len()), "camera distortion", counts.1, found)?;
-        let straight = coefficients.iter().all(|value| *value == 0.0);
-        Ok(match model {
-            "equidistant" => Self::Fisheye(padded(coefficients)),
-            _ if straight => Self::Pinhole,
-            "plumb_bob" => Self::PlumbBob(padded(coefficients)),
-            "rational_polynomial" => Self::Rational(padded(coefficients)),
-            _ => Self::InversePlumbBob(padded(coefficients)),
-        })
+        Unexpected::unless(counts.contains(&coefficients.len()), "camera distortion", expected, found)?;
+        let straight = coefficients.iter().all(|value| *value == 0.0) && model != "equidistant";
+        Ok(if straight { Self::Pinhole } else { lens })
     }
 
     /// The `distortion_model` that [`Lens::from_model`] accepts for this lens.
@@ -368,13 +365,12 @@ fn fisheye_inverse(k: &[f64; 4], at: [f64; 2], domain: f64) -> Option<[f64; 2]> 
         } else {
             high = angle
         }
-        let next = angle - (value - target) / slope;
-        let next = if next > low && next < high { next } else { 0.5 * (low + high) };
-        if (next - angle).abs() <= f64::EPSILON * angle {
-            angle = next;
+        let before = angle;
+        let next = before - (value - target) / slope;
+        angle = if next > low && next < high { next } else { 0.5 * (low + high) };
+        if (angle - before).abs() <= f64::EPSILON * before {
             break;
         }
-        angle = next;
     }
     let scale = angle.tan() / target;
     (scale > 0.0 && scale.is_finite()).then(|| at.map(|value| value * scale))

@@ -256,17 +256,15 @@ impl Camera {
     pub fn window(&self, corners: impl IntoIterator<Item = Vec3>) -> [Range<usize>; 2] {
         let whole = [0..self.width, 0..self.height];
         let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
-        let mut take = |place: [f64; 2]| {
-            for (axis, value) in place.into_iter().enumerate() {
-                (low[axis], high[axis]) = (low[axis].min(value), high[axis].max(value));
-            }
-        };
         for corner in corners {
             if !(corner.z >= NEAREST_RETURN) {
                 return whole;
             }
-            let bend = self.distorts();
-            take(self.project(corner).filter(|_| !bend).unwrap_or([corner.x / corner.z, corner.y / corner.z]));
+            let ray = [corner.x / corner.z, corner.y / corner.z];
+            let place = if self.distorts() { ray } else { self.project(corner).unwrap_or(ray) };
+            for axis in 0..2 {
+                (low[axis], high[axis]) = (low[axis].min(place[axis]), high[axis].max(place[axis]));
+            }
         }
         if self.distorts() {
             match self.bounds(low, high) {

@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn single_precision_agrees_with_double() -> Result<(), crate::shape::ShapeError> {
+    fn single_precision_agrees_with_double() -> Result<(), crate::error::Unexpected> {
         let shape = TaperedEllipticCylinder::new(0.4, 0.10, 0.06, 0.05, 0.04)?;
         let pose = Pose::new(Vec3::new(0.3, -0.2, 0.5), Vec3::new(0.4, 1.1, -0.7));
         let mut queries = Points::default();

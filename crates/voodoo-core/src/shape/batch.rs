@@ -23,7 +23,7 @@ const SETTLED: f64 = 0.2;
 /// forearm.closest_points(&Pose::IDENTITY, &queries, &mut found);
 /// assert!((found.signed_distance[0] - 0.1).abs() < 1e-6);
 /// assert_eq!(found.region[1], Region::ProximalCap);
-/// # Ok::<(), voodoo_core::ShapeError>(())
+/// # Ok::<(), voodoo_core::Unexpected>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SurfaceBatch {
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn limbs_rarely_need_the_exact_path() -> Result<(), crate::shape::ShapeError> {
+    fn limbs_rarely_need_the_exact_path() -> Result<(), crate::error::Unexpected> {
         for [length, a0, b0, a1, b1] in
             [[0.55, 0.16, 0.11, 0.19, 0.12], [0.25, 0.05, 0.045, 0.03, 0.027], [0.42, 0.06, 0.065, 0.04, 0.042]]
         {
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn the_baseline_kernel_agrees_with_the_selected_one() -> Result<(), crate::shape::ShapeError> {
+    fn the_baseline_kernel_agrees_with_the_selected_one() -> Result<(), crate::error::Unexpected> {
         let shape = TaperedEllipticCylinder::new(0.25, 0.05, 0.045, 0.03, 0.027)?;
         let constants = Constants::new(&shape, &Pose::IDENTITY);
         let (mut fast, mut plain) = (BlockResult::ZERO, BlockResult::ZERO);
@@ -248,7 +248,7 @@ mod tests {
     #[test]
     #[cfg(target_arch = "x86_64")]
     #[allow(unsafe_code, reason = "a function compiled for an instruction set is called where the processor has it")]
-    fn wider_registers_change_no_bit() -> Result<(), crate::shape::ShapeError> {
+    fn wider_registers_change_no_bit() -> Result<(), crate::error::Unexpected> {
         if !has_avx512() || !std::arch::is_x86_feature_detected!("fma") {
             return Ok(());
         }

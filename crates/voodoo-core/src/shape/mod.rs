@@ -25,8 +25,8 @@ mod ray;
 mod ruling;
 mod section;
 
+use crate::error::Unexpected;
 use crate::math::{Aabb, Pose, Vec3};
-use thiserror::Error;
 
 pub use batch::SurfaceBatch;
 pub(crate) use section::{FacingSection, Section};
@@ -38,39 +38,6 @@ pub(crate) const MAX_SIZE: f64 = 1e3;
 /// On a rim, the normal is the direction to the query when the query is farther away than this, meters, and the mean of the two
 /// adjacent faces' normals when it is nearer.
 pub(crate) const RIM_NORMAL_DISTANCE: f64 = 1e-4;
-
-/// Why a shape was rejected.
-///
-/// ```
-/// use voodoo_core::{ShapeError, TaperedEllipticCylinder};
-///
-/// let refused = TaperedEllipticCylinder::new(-0.25, 0.05, 0.05, 0.03, 0.03);
-/// assert!(matches!(refused, Err(ShapeError::OutOfRange { name: "length", .. })));
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum ShapeError {
-    /// A length or semi-axis is not a number, infinite, negative or too large.
-    #[error("{name} must be between {min} and {MAX_SIZE} m, found {value}")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// The least value allowed, meters.
-        min: f64,
-        /// The value found.
-        value: f64,
-    },
-    /// Both ends have (nearly) no extent along one axis, so the solid would have no interior.
-    #[error(
-        "one of {axis}0 and {axis}1 must be at least {MIN_SIZE} m, found {} and {}: the limb would be flat", values[0], values[1]
-    )]
-    Flat {
-        /// The axis, `a` or `b`.
-        axis: char,
-        /// The semi-axes of the proximal and of the distal end, meters.
-        values: [f64; 2],
-    },
-}
 
 /// The face of the closed surface on which a point lies.
 ///
@@ -117,7 +84,9 @@ pub struct SurfacePoint {
 /// let near = forearm.closest_point(Vec3::new(0.2, 0.0, 0.1));
 /// assert_eq!(near.region, Region::Side);
 /// assert!((near.signed_distance - 0.1575).abs() < 1e-3);
-/// # Ok::<(), voodoo_core::ShapeError>(())
+/// let refused = TaperedEllipticCylinder::new(-0.25, 0.05, 0.05, 0.03, 0.03).unwrap_err();
+/// assert_eq!(refused.to_string(), "length: expected 0.000001 to 1000 m, found -0.25");
+/// # Ok::<(), voodoo_core::Unexpected>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TaperedEllipticCylinder {
@@ -132,20 +101,18 @@ impl TaperedEllipticCylinder {
     /// A shape from its length and its semi-axes along x and y at `z = 0` (`a0`, `b0`) and `z = length` (`a1`, `b1`), meters.
     ///
     /// # Errors
-    /// [`ShapeError::OutOfRange`] when a value is not a number, negative or above 1000 m, or the length below
-    /// 1e-6 m; [`ShapeError::Flat`] when `a0` and `a1`, or `b0` and `b1`, are both below 1e-6 m.
-    pub fn new(length: f64, a0: f64, b0: f64, a1: f64, b1: f64) -> Result<Self, ShapeError> {
+    /// [`Unexpected`] when a value is not a number, negative or above 1000 m, or the length below 1e-6 m; and when `a0` and
+    /// `a1`, or `b0` and `b1`, are both below 1e-6 m, so that the solid would have no interior.
+    pub fn new(length: f64, a0: f64, b0: f64, a1: f64, b1: f64) -> Result<Self, Unexpected> {
         for (name, min, value) in
             [("length", MIN_SIZE, length), ("a0", 0.0, a0), ("b0", 0.0, b0), ("a1", 0.0, a1), ("b1", 0.0, b1)]
         {
-            if !(min..=MAX_SIZE).contains(&value) {
-                return Err(ShapeError::OutOfRange { name, min, value });
-            }
+            let expected = format_args!("{min} to {MAX_SIZE} m");
+            Unexpected::unless((min..=MAX_SIZE).contains(&value), name, expected, value)?;
         }
-        for (axis, values) in [('a', [a0, a1]), ('b', [b0, b1])] {
-            if values[0].max(values[1]) < MIN_SIZE {
-                return Err(ShapeError::Flat { axis, values });
-            }
+        for (what, first, last) in [("a0 and a1", a0, a1), ("b0 and b1", b0, b1)] {
+            let expected = format_args!("at least {MIN_SIZE} m at one end, so that the limb is not flat");
+            Unexpected::unless(first.max(last) >= MIN_SIZE, what, expected, format_args!("{first} and {last}"))?;
         }
         Ok(Self { length, a0, b0, a1, b1 })
     }
@@ -193,7 +160,7 @@ impl TaperedEllipticCylinder {
     }
 
     /// The shape with its length and its semi-axes `(a0, b0, a1, b1)` multiplied by factors.
-    pub(crate) fn stretched(&self, length: f64, [a0, b0, a1, b1]: [f64; 4]) -> Result<Self, ShapeError> {
+    pub(crate) fn stretched(&self, length: f64, [a0, b0, a1, b1]: [f64; 4]) -> Result<Self, Unexpected> {
         Self::new(self.length * length, self.a0 * a0, self.b0 * b0, self.a1 * a1, self.b1 * b1)
     }
 

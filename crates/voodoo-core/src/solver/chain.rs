@@ -3,8 +3,8 @@
 use nalgebra::{Matrix6, Vector6};
 
 use super::{DAMPING, FLOOR, LARGEST_TURN};
-use crate::body::Body;
 use crate::body::kinematics::{Chain, exp, hinge_axis, joint_axes, joint_turn, place, screw};
+use crate::body::{Body, JointKind};
 use crate::math::solve_in_place;
 use crate::math::{Pose, Quat, Vec3, refill, reset};
 use crate::terms::normal_equations::NormalEquations;
@@ -33,7 +33,7 @@ impl ChainSolver {
     /// One damped step from the normal equations at `poses`, scaled by `stride`; afterwards the joints are exactly closed.
     pub(crate) fn step(&mut self, body: &Body, stride: f64, poses: &mut [Pose]) {
         self.assemble(body, poses, DAMPING);
-        if solve_in_place(&mut self.h, &mut self.step, self.chain.freedoms) {
+        if solve_in_place(&mut self.h, &mut self.step, self.chain.freedoms()) {
             self.apply(body, stride, poses);
         }
     }
@@ -41,7 +41,7 @@ impl ChainSolver {
     pub(super) fn assemble(&mut self, body: &Body, poses: &[Pose], damping: f64) {
         let Self { normal, chain, screws, composite, h, step, .. } = self;
         chain.layout(body);
-        let n = chain.freedoms;
+        let n = chain.freedoms();
         // The twist of every unknown: six of the root, then those of the joints.
         refill(screws, (0..6).map(|i| Vector6::ith(i, 1.0)));
         for (_, parent, joint) in body.joints() {
@@ -101,9 +101,9 @@ impl ChainSolver {
         // Joint rotations are computed from the old poses before their parents move. Children come after parents, so iterate
         // backwards.
         for (limb, parent, joint) in body.joints().rev() {
-            let (turn, start) = (joint_turn(joint, &poses[parent], &poses[limb]), chain.start[limb]);
-            let more = match chain.count[limb] {
-                1 => hinge_axis(joint) * part(start),
+            let (turn, start) = (joint_turn(joint, &poses[parent], &poses[limb]), chain.unknowns(limb).start);
+            let more = match joint.kind() {
+                JointKind::Hinge => hinge_axis(joint) * part(start),
                 _ => Vec3::new(part(start), part(start + 1), part(start + 2)),
             };
             // The slot stores the joint's new rotation until the forward pass sets the limb pose.

@@ -13,7 +13,7 @@ impl ChainSolver {
     pub(crate) fn factor(&mut self, body: &Body, poses: &[Pose], add: impl FnOnce(&mut [f64])) -> bool {
         self.assemble(body, poses, 0.0);
         add(&mut self.h);
-        factor(&mut self.h, self.chain.freedoms)
+        factor(&mut self.h, self.chain.freedoms())
     }
 
     /// Covariance of a limb's pose about the `origin` of its frame: rotation in world axes (radians), then translation (meters).
@@ -37,7 +37,7 @@ impl ChainSolver {
     /// of which the twist is given.
     fn covariance(&mut self, limb: usize, derivatives: impl Fn(usize, &Vector6<f64>) -> [f64; 6]) -> Matrix6<f64> {
         let Self { chain, screws, h, rows, moving, .. } = self;
-        let n = chain.freedoms;
+        let n = chain.freedoms();
         rows.resize(n, [0.0; 6]);
         refill(moving, chain.up_from(limb).flat_map(|limb| chain.unknowns(limb).rev()));
         for unknown in &*moving {
@@ -89,7 +89,7 @@ mod tests {
             own.h = block(limb);
         }
         spread.chain.layout(body);
-        let n = spread.chain.freedoms;
+        let n = spread.chain.freedoms();
         let own: Vec<f64> = (0..n).map(|index| 1.0 + (index % 5) as f64).collect();
         let add = |h: &mut [f64]| h.iter_mut().step_by(n + 1).zip(&own).for_each(|(value, own)| *value += own);
         assert!(spread.factor(body, &poses, add));

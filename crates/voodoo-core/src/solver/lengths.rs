@@ -19,7 +19,7 @@ impl ChainSolver {
     ) -> bool {
         self.assemble(body, poses, 0.0);
         self.couple(body, poses, pairs);
-        if !factor(&mut self.h, self.chain.freedoms) {
+        if !factor(&mut self.h, self.chain.freedoms()) {
             return false;
         }
         let count = pairs.len();
@@ -49,7 +49,7 @@ impl ChainSolver {
     /// Computes second derivatives and gradient of the lengths, and the mixed derivatives with the pose unknowns.
     fn couple(&mut self, body: &Body, poses: &[Pose], pairs: &[Pair]) {
         let Self { chain, screws, composite, mixed, reduced, gradient, .. } = self;
-        let (n, count) = (chain.freedoms, pairs.len());
+        let (n, count) = (chain.freedoms(), pairs.len());
         reset(mixed, count * n, 0.0);
         reset(reduced, count * count, 0.0);
         reset(gradient, count, 0.0);
@@ -87,7 +87,7 @@ impl ChainSolver {
     fn eliminate(&mut self, count: usize) {
         // `step` holds the negative gradient of the pose unknowns.
         let Self { chain, h, step, mixed, reduced, gradient, .. } = self;
-        let n = chain.freedoms;
+        let n = chain.freedoms();
         // With `H = L^T L`, `b^T H^-1 c` is the dot product of the two vectors after half of the substitution.
         vectorized!(half_substitute(h, step, n));
         for row in 0..count {

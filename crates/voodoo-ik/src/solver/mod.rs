@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use super::goal::{Goal, level_cost};
 use super::image::Criterion;
-use super::linear::{Damped, Taken};
+use super::linear::LinearSystem;
 use super::model::{ChainModel, Kinematics};
 use voodoo_core::math::{Pose, refill, reset};
 
@@ -107,18 +107,6 @@ struct Levels {
     best: Vec<f64>,
 }
 
-/// The linear system of one level, and its solution.
-#[derive(Clone, Debug, Default)]
-struct LinearSystem {
-    taken: Taken,
-    damped: Damped,
-    jacobian: Vec<f64>,
-    projected: Vec<f64>,
-    residual: Vec<f64>,
-    target: Vec<f64>,
-    part: Vec<f64>,
-}
-
 /// What is to be solved.
 #[derive(Clone, Copy, Debug)]
 pub struct IkProblem<'a> {
@@ -185,29 +173,27 @@ impl IkSolver {
         let (image, active) = (phase == count, count.min(phase + 1));
         let mut nudged = false;
         let mut idle = 0;
-        let mut rest = false;
-        for step in 0..options.steps {
+        let mut rest = (0..options.steps).any(|step| {
             let reached = self.here.cost[..active].iter().all(|cost| cost.sqrt() < options.tolerance);
             if reached && (!image || self.here.h <= 0.0) {
-                rest = true;
-                break;
+                return true;
             }
             self.report.steps += 1;
             let before = self.here.h;
             let moved = self.step(problem, phase, slack, angles);
             idle = if image && before - self.here.h < LEAST_FALL * before { idle + 1 } else { 0 };
             if moved >= options.still && idle < STALLED_STEPS {
-                continue;
+                return false;
             }
             let stuck = !image && self.here.cost[phase].sqrt() > options.tolerance;
             if nudged || !stuck || step + 1 == options.steps {
-                rest = true;
-                break;
+                return true;
             }
             // Either a saddle (a stretched arm whose hand is to come nearer) or the optimum: a perturbation decides which.
             nudged = true;
             self.nudge(problem, angles);
-        }
+            false
+        });
         if nudged && self.worse_than_saved() {
             angles.copy_from_slice(&self.saved_angles);
             self.evaluate_here(problem, angles);

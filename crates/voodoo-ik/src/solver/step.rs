@@ -45,7 +45,7 @@ impl IkSolver {
             }
             self.linear.projected.clone_from(&self.linear.jacobian);
             self.linear.projected.chunks_exact_mut(n).for_each(|row| self.linear.taken.project(row));
-            self.linear.damped.solve(&self.linear.projected, &self.linear.target, damping, &mut self.linear.part);
+            self.linear.solve(damping);
             if !self.add_part(problem, level, angles) {
                 break;
             }
@@ -105,8 +105,7 @@ impl IkSolver {
     /// Takes the whole step, or as much of it as leaves no level worse than the levels above it require.
     fn advance(&mut self, problem: &IkProblem, last: usize, slack: bool, angles: &mut [f64]) -> f64 {
         let (n, count) = (angles.len(), self.levels.ranges.len());
-        self.propose(problem, angles, last, 1.0);
-        self.evaluate(problem);
+        self.attempt(problem, angles, last, 1.0);
         let Some(failed) = self.first_failure(n, last, slack) else {
             for level in 0..count.min(last + 1) {
                 // Slow progress indicates an unreachable goal, where less damping would overshoot.
@@ -126,8 +125,7 @@ impl IkSolver {
             if (failed == last && fraction == 1.0) || (failed == 0 && fraction == 0.0) {
                 continue;
             }
-            self.propose(problem, angles, failed, fraction);
-            self.evaluate(problem);
+            self.attempt(problem, angles, failed, fraction);
             if (fraction == 0.0 && slack) || self.first_failure(n, failed, slack).is_none() {
                 return self.take_trial(angles);
             }
@@ -136,7 +134,8 @@ impl IkSolver {
         if self.levels.trust.first().is_none_or(|trust| *trust < 1e5) { f64::INFINITY } else { 0.0 }
     }
 
-    fn propose(&mut self, problem: &IkProblem, angles: &[f64], stage: usize, fraction: f64) {
+    /// Evaluates the trial posture of the stages above one, and a fraction of its own part.
+    fn attempt(&mut self, problem: &IkProblem, angles: &[f64], stage: usize, fraction: f64) {
         let n = angles.len();
         let limits = problem.model.limits();
         for i in 0..n {
@@ -145,6 +144,7 @@ impl IkSolver {
             // The clamp only removes rounding errors: stages end at the limits.
             self.trial_angles[i] = (angles[i] + step).clamp(limits[i][0], limits[i][1]);
         }
+        self.evaluate(problem);
     }
 
     /// The first level that the trial leaves worse than it was before its own part, beyond the second-order effect of the other
