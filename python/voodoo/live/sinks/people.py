@@ -56,8 +56,7 @@ def shown(step: Step, root_frame: str) -> Shown:
     layout = layout_of(first.joint_names, step.bodies[number].limb_tree, step.bodies[number].limb_joints)
     cores = [step.bodies[number].core for number in found]
     rows = layout.core.rows(list(found.values()), cores, turn.pose if turn.words else None)
-    *_, covariances, _ = layout.parts(rows)
-    known = np.isfinite(covariances[:, 0]).tolist()
+    known = np.isfinite(rows[:, sum(layout.widths[:5])]).tolist()  # the first number of the covariance
     seen = [statuses[number] != "lost" for number in found]
     there, sure = tuple(compress(found, seen)), tuple(compress(known, seen))
     return Shown(
