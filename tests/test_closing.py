@@ -3,7 +3,7 @@
 from collections import Counter
 
 from commands import run
-from voodoo.cli.track import closing_doubts
+from voodoo.cli.track import closing_remarks
 from voodoo.recordings import sample_path
 
 
@@ -22,8 +22,12 @@ def test_the_end_tells_stature_speed_root_frame_and_shares(tmp_path):
 
 def test_unlikely_results_are_doubted():
     good = Counter(tracking=9, lost=1)
-    assert closing_doubts(good, stature=1.7, told=1.76) == closing_doubts(good, stature=None, told=None) == []
-    assert len(closing_doubts(good, stature=0.7, told=None)) == len(closing_doubts(good, stature=2.3, told=None)) == 1
-    assert closing_doubts(good, stature=0.7, told=0.7) == [], "a small child was announced"
-    assert "50 % of the frames" in closing_doubts(Counter(tracking=5, lost=5), stature=1.7, told=None)[0]
-    assert closing_doubts(Counter(tracking=6, lost=4), stature=1.7, told=None) == []
+    assert closing_remarks(good, stature=1.7, height_m=1.76) == closing_remarks(good, stature=None, height_m=None) == []
+    assert (
+        len(closing_remarks(good, stature=0.7, height_m=None))
+        == len(closing_remarks(good, stature=2.3, height_m=None))
+        == 1
+    )
+    assert closing_remarks(good, stature=0.7, height_m=0.7) == [], "a small child was announced"
+    assert "50 % of the frames" in closing_remarks(Counter(tracking=5, lost=5), stature=1.7, height_m=None)[0]
+    assert closing_remarks(Counter(tracking=6, lost=4), stature=1.7, height_m=None) == []

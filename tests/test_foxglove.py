@@ -139,7 +139,7 @@ def test_a_client_of_foxglove_receives_poses_and_nobody_costs_nothing():
         assert channels["/people"]["schemaName"] == "foxglove.SceneUpdate"
         wanted = [{"id": number, "channelId": one["id"]} for number, one in enumerate(channels.values())]
         client.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
-        until(lambda: sink._channels.are_wanted)
+        until(lambda: sink._channels.are_subscribed)
         sink.publish(step_of(track, body, 3))
         received = [client.recv(timeout=5) for _ in range(2)]
     stamps = {struct.unpack_from("<BIQ", data)[2] for data in received}

@@ -8,7 +8,7 @@ import pytest
 
 from commands import run
 from voodoo.recordings import RecordingInfo, sample_path
-from voodoo.recordings.first_images import doubts
+from voodoo.recordings.first_images import warnings
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.recording import SensorInfo
 
@@ -58,7 +58,7 @@ def test_the_bundled_recording_as_json():
 def test_time_that_goes_backwards_and_lasers_without_odometry_are_doubted(tmp_path):
     def told(root, duration):
         sensor = SensorInfo("/scan", "scan", "laser", 2, 10.0, "scan")
-        return doubts(RecordingInfo("a", tmp_path, "ros2", 2, 10.0, duration, 1.0, root, (sensor,)), LeftOut())
+        return warnings(RecordingInfo("a", tmp_path, "ros2", 2, 10.0, duration, 1.0, root, (sensor,)), LeftOut())
 
     assert told("odom", 1.0) == []
     assert len(told("base_link", 1.0)) == 1 and "/scan" in told("base_link", 1.0)[0]

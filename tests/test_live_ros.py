@@ -25,7 +25,7 @@ from voodoo.live.source import SourceGone
 from voodoo.live.sources.played import PlayedSource
 from voodoo.live.sources.ros2 import Ros2Source, listing
 from voodoo.measurements import ColorImage, DepthImage, LaserScan, PointCloud
-from voodoo.pipeline.floor import seen_floor
+from voodoo.pipeline.floor import visible_floor
 from voodoo.pipeline.front_end import nobody
 from voodoo.pipeline.run import start_tracker, track
 from voodoo.recordings import open_recording, sample_path
@@ -486,7 +486,7 @@ def test_live_topics_stand_on_the_floor_that_is_seen_as_files_do(root, rate):
         assert not said and turns[-1].words == "" and body.header.frame_id == root
         return
     assert len(said) == 1 and turns[0].words == by_axes(root).words
-    expected = by_floor(seen_floor(recording), optical=True)
+    expected = by_floor(visible_floor(recording), optical=True)
     assert turns[-1].words == expected.words
     # The camera is 1.3 m high, and looks down by 7 degrees.
     np.testing.assert_allclose(turns[-1].pose, expected.pose, atol=0.03)

@@ -308,7 +308,7 @@ def test_no_pose_is_late_beside_programs_that_hang_and_hosts_that_are_dead():
                 told = json.loads(text) if isinstance(text, str) else {}
             wanted = [{"id": one["id"], "channelId": one["id"]} for one in told["channels"]]
             client.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
-            until(lambda server=server: getattr(getattr(server, "_channels", server), "are_wanted", True))
+            until(lambda server=server: getattr(getattr(server, "_channels", server), "are_subscribed", True))
         until(lambda: servers[0]._server.connections)
         for number in range(200):  # nothing more goes through
             for server in servers:

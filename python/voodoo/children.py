@@ -14,7 +14,7 @@ NEUTRAL_FOLDER = os.path.abspath(os.sep)  # noqa: PTH100 - a string for subproce
 """Working directory for programs that need no files of the user: only the administrator can write there."""
 _QUIET = Path(__file__).resolve().parent / "data" / "quiet"
 """A configuration folder in which telemetry is off; see `children`."""
-_WANTED = "FORCE_RERUN_ANALYTICS"
+_ANALYTICS = "FORCE_RERUN_ANALYTICS"
 """Environment variable of Rerun that turns its telemetry on."""
 
 
@@ -30,7 +30,7 @@ def children(*, quiet: bool = False) -> Iterator[None]:
         quiet: Rerun's telemetry is off, unless the user sets FORCE_RERUN_ANALYTICS.
     """
     values = {"PYTHONSAFEPATH": "1"}
-    if quiet and not os.environ.get(_WANTED):
+    if quiet and not os.environ.get(_ANALYTICS):
         values["XDG_CONFIG_HOME"] = str(_QUIET)
     before = {name: os.environ[name] for name in values if name in os.environ}
     tools: Any = util

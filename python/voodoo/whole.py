@@ -160,13 +160,13 @@ def move_whole(place: Path, path: Path) -> None:
     for written in (place, *place.rglob("*")) if place.is_dir() else (place,):
         _sync(written)
     if place.is_dir() and path.is_dir() and any(path.iterdir()):
-        _exchange(place, path)
+        _swap(place, path)
     else:
         os.replace(place, path)  # noqa: PTH105 - the replacement must be atomic
     _sync(path.parent)
 
 
-def _exchange(place: Path, path: Path) -> None:
+def _swap(place: Path, path: Path) -> None:
     """Replace a folder that is not empty, in two steps; after a crash between them the old one is in a folder that is kept."""
     aside = Hidden(path)
     try:

@@ -162,7 +162,7 @@ impl Detect for Detector {
         self.nearest = None;
         self.rejections.next_image();
         self.segmentation.find(image, around);
-        let Self { memory, segmentation, found: shown, nearest, rejections, stature, .. } = self;
+        let Self { memory, segmentation, found: accepted, nearest, rejections, stature, .. } = self;
         let mut found: Vec<(&PersonCandidate, Detection)> = Vec::new();
         let most = if query == DetectionQuery::All { MAX_EVALUATIONS } else { 1 };
         let order = order(&segmentation.candidates, rejections, query, &image.world_from_sensor.inverse());
@@ -197,12 +197,12 @@ impl Detect for Detector {
         let mut kept = Vec::new();
         for (candidate, mut detection) in found {
             // Of candidates that share components only the most confident is kept.
-            if shown.iter().any(|other| other.overlaps(candidate)) {
+            if accepted.iter().any(|other| other.overlaps(candidate)) {
                 continue;
             }
             detection.floor = floor;
             detection.pixels = segmentation.mask(candidate);
-            shown.push(candidate.clone());
+            accepted.push(candidate.clone());
             kept.push(detection);
         }
         Ok(kept)

@@ -89,12 +89,12 @@ def read_table(text: str, source: object) -> dict[str, Row]:
 
 def write_index(rows: Iterable[Row], pages: Container[str]) -> str:
     """A web page with the table, and links to those `pages` (names of files in REPORTS) that there are."""
-    shown = COLUMNS[:-1]
+    columns = COLUMNS[:-1]
     lines = ["<!DOCTYPE html><html lang=en><meta charset=utf-8><title>recordings</title>"]
     lines += ["<body style='font:15px sans-serif;margin:1.5em'><table cellpadding=4>"]
-    lines.append(f"<tr>{''.join(f'<th align=left>{name}' for name in shown)}")
+    lines.append(f"<tr>{''.join(f'<th align=left>{name}' for name in columns)}")
     for row in sorted(rows, key=lambda row: row.recording):
-        cells = [escape(cell(getattr(row, name))) for name in shown]
+        cells = [escape(cell(getattr(row, name))) for name in columns]
         if f"{row.recording}.html" in pages:
             cells[0] = f"<a href='{REPORTS}/{quote(row.recording)}.html'>{cells[0]}</a>"
         lines.append(f"<tr>{''.join(f'<td>{words}' for words in cells)}")

@@ -221,8 +221,8 @@ def _track(job: Job, path: Path) -> tuple[Row, list[Columns]]:
         raise RecordingError(f"{job.source}: expected at least one frame that can be used, found none")
     if job.report:
         counts = {} if left_out is None else left_out.counts
-        shown = {f"person {one}": replace(Track.joined(own), left_out=counts) for one, own in found.items()}
-        Store(job.out).write(f"{REPORTS}/{job.name}.html", report_page(job.name, shown).encode())
+        by_person = {f"person {one}": replace(Track.joined(own), left_out=counts) for one, own in found.items()}
+        Store(job.out).write(f"{REPORTS}/{job.name}.html", report_page(job.name, by_person).encode())
     tracks = {one: joined(own) for one, own in found.items()}
     error = _error(recording, tracks[1]) if one_only else float("nan")
     words = [word for one in tracks.values() for word in one.status]

@@ -72,7 +72,7 @@ def batch_command(
     from voodoo.errors import NoPoseError, VoodooError
     from voodoo.whole import check_outputs
 
-    with reporting(as_json) as told:
+    with reporting(as_json) as reported:
         settings = Settings(
             use=kinds_of(use),
             init=init,
@@ -111,10 +111,10 @@ def batch_command(
         ours = [batch.rows[job.name] for job in batch.jobs if job.name in batch.rows]
         done = sum(row.status == DONE for row in ours)
         message = f"{done} of {len(batch.jobs)} recordings done, {before} before; wrote {out}"
-        if told is not None:
-            told |= {"out": out, "recordings": list(batch.rows.values())}
+        if reported is not None:
+            reported |= {"out": out, "recordings": list(batch.rows.values())}
         print_interrupted(interrupted, message)
-        if told is None:
+        if reported is None:
             typer.echo(message)
         broken = [row for row in ours if row.status == FAILED]
         if broken:

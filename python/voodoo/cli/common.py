@@ -81,11 +81,11 @@ def refuse_missing(failures: Sequence[Exception], done: str) -> None:
 def progressing(items: Iterable[T], words: str, total: int) -> Iterator[T]:
     """Show a progress bar on stderr; if it is no terminal, a line every few seconds."""
     if not sys.stderr.isatty():
-        told = time.monotonic()
+        reported = time.monotonic()
         for count, item in enumerate(items, 1):
             yield item
-            if time.monotonic() - told > _LINE_S:
-                told = time.monotonic()
+            if time.monotonic() - reported > _LINE_S:
+                reported = time.monotonic()
                 print_message(f"{words}: {count} of {total}")
         return
     from rich.console import Console

@@ -50,7 +50,7 @@ _SWITCH_S = 5e-4
 """Switch interval of Python threads: the default of 5 ms is as long as a whole step."""
 
 
-def run(live: Live, start: ParsedTracking, wanted: Outputs, *, duration: float | None) -> tuple[list[Path], bool, int]:
+def run(live: Live, start: ParsedTracking, asked: Outputs, *, duration: float | None) -> tuple[list[Path], bool, int]:
     """Track until the sources end, for `duration` [s], or until a signal; finish files and write the report.
 
     Returns:
@@ -61,7 +61,7 @@ def run(live: Live, start: ParsedTracking, wanted: Outputs, *, duration: float |
     """
     warm_up()
     with _prompt_threads(), deferred() as ended, live:
-        outputs = _outputs(live, wanted)
+        outputs = _outputs(live, asked)
         session = Session(live, lambda frame: _follower(start, FirstFrame(live, frame)), outputs=outputs)
         try:
             _check_states(session, ended, duration)
@@ -69,10 +69,10 @@ def run(live: Live, start: ParsedTracking, wanted: Outputs, *, duration: float |
             try:
                 session.finish()
             finally:
-                if wanted.report is not None:
-                    write_whole(wanted.report, json.dumps(session.report(), indent=2) + "\n")
+                if asked.report is not None:
+                    write_whole(asked.report, json.dumps(session.report(), indent=2) + "\n")
         print_message(f"{session.line()}; {session.published} published")
-        others = [path for path in (wanted.record, wanted.report) if path is not None and path.exists()]
+        others = [path for path in (asked.record, asked.report) if path is not None and path.exists()]
         files = [path for output in outputs if isinstance(output, FileOutput) for path in output.written]
         return [*files, *others], ended.is_set(), session.with_pose
 
@@ -132,20 +132,20 @@ def _follower(start: ParsedTracking, first: FirstFrame) -> Follower:
     return Follower(start.tracker(first), settings=start.settings(first), starts=starts)
 
 
-def _outputs(live: Live, wanted: Outputs) -> list[Output]:
+def _outputs(live: Live, asked: Outputs) -> list[Output]:
     # Addresses come first: one that is of no use leaves no file behind.
-    addresses = list(wanted.to or ())
-    if wanted.publish and ROS2 not in addresses:
+    addresses = list(asked.to or ())
+    if asked.publish and ROS2 not in addresses:
         addresses.append(ROS2)
     outputs = [sink_of(address, root_frame=lambda: live.root_frame, on_message=print_message) for address in addresses]
-    if wanted.out:
-        outputs.append(FileOutput(wanted.out, root_frame=lambda: live.root_frame))
-    if wanted.record is not None:
-        outputs.append(Recorder(wanted.record, root_frame=lambda: live.root_frame))
-        print_message(f"{wanted.record} stores pictures of people")
-    if wanted.view or wanted.serve is not None:
+    if asked.out:
+        outputs.append(FileOutput(asked.out, root_frame=lambda: live.root_frame))
+    if asked.record is not None:
+        outputs.append(Recorder(asked.record, root_frame=lambda: live.root_frame))
+        print_message(f"{asked.record} stores pictures of people")
+    if asked.view or asked.serve is not None:
         try:
-            viewer = Viewer(name=live.sources[0].name, serve=wanted.serve)
+            viewer = Viewer(name=live.sources[0].name, serve=asked.serve)
         except VoodooError as error:
             raise VoodooError(str(error).replace(_NO_SCREEN, "--serve PORT shows it in a browser")) from error
         outputs.append(ShowOutput(viewer))

@@ -25,7 +25,7 @@ from voodoo.export.files import check_target, is_table
 from voodoo.export.spool import Spool
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, by_axes, by_feet, by_floor, lying_words
-from voodoo.pipeline.floor import seen_floor
+from voodoo.pipeline.floor import visible_floor
 from voodoo.pipeline.run import TrackedFrame
 from voodoo.pipeline.start import AUTO, Beginning, beginning_of, start_people, start_tracker
 from voodoo.recordings.left_out import LeftOut
@@ -223,7 +223,7 @@ def turn_of(source: Recording, tracks: Sequence[Track], targets: Sequence[Path],
     stands = root in LEVEL_FRAMES and not optical and not any(lying_words(track, root) for track in tracks)
     if stands or not (upright or (optical and not all(map(is_table, targets)))):
         return by_axes(root, optical=optical)
-    floor = seen_floor(source)
+    floor = visible_floor(source)
     if floor is not None:
         return by_floor(floor, optical=optical)
     return by_feet(tracks, root, optical=optical) if upright else by_axes(root, optical=optical)

@@ -20,7 +20,7 @@ def info_command(
     """Print the contents of a recording: sensors, topics, frames, rates, root frame and reference, and of the first image of each
     camera size, bits, calibration, field of view and range of depths."""
     from voodoo.cli.running import opened
-    from voodoo.recordings.first_images import depths_of, doubts, first_images
+    from voodoo.recordings.first_images import depths_of, first_images, warnings
     from voodoo.recordings.left_out import LeftOut
 
     left_out = LeftOut()
@@ -28,7 +28,7 @@ def info_command(
     about = source.info()
     images, damage = first_images(source)
     depth = depths_of(images)
-    notes = [*doubts(about, left_out, images), damage, "" if depth is None else depth.warning]
+    notes = [*warnings(about, left_out, images), damage, "" if depth is None else depth.warning]
     if as_json:
         print_json(
             {**vars(about), "camera_root": about.camera_root, "images": images, "depths": depth}

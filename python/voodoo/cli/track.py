@@ -191,15 +191,15 @@ def track_command(
     if not several:
         message = "\n".join([message, *closing_lines(spool.states, done.seconds, source.info(), stature=size)])
     print_result(message, spool.paths)
-    for doubt in [words for one in sample if (words := lying_words(one, source.root_frame, turn))][:1]:
-        print_message(f"{source.name}: {doubt}")
-    told = tracking.height or getattr(start.beginning, "height_m", None)
-    if told is None and start.beginning is None and source.start is not None:
-        told = source.start.get("height_m")
+    for remark in [words for one in sample if (words := lying_words(one, source.root_frame, turn))][:1]:
+        print_message(f"{source.name}: {remark}")
+    height_m = tracking.height or getattr(start.beginning, "height_m", None)
+    if height_m is None and start.beginning is None and source.start is not None:
+        height_m = source.start.get("height_m")
     # Frames before a given start are meant to be without a pose.
     begun = spool.states - Counter({SEARCHING: 0 if start.beginning in (None, AUTO) else len(source)})
-    for doubt in closing_doubts(begun, stature=size, told=told) if spool.found and not several else ():
-        print_message(f"{source.name}: {doubt}")
+    for remark in closing_remarks(begun, stature=size, height_m=height_m) if spool.found and not several else ():
+        print_message(f"{source.name}: {remark}")
     _print_warnings(source, spool, left_out, refusals)
 
 
@@ -233,7 +233,7 @@ def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None, r
 STATUS_PAGE = "docs/how-to/read-the-status.md"
 _USUAL_M = (0.8, 2.1)
 """Statures from a small child to a tall adult."""
-_TOLD = 0.06
+_STATURE_TOLERANCE = 0.06
 """A stature that differs from what was told by a larger fraction is doubted: sizes of limbs are found to some percent."""
 _LEAST_TRACKING = 0.5
 
@@ -253,19 +253,21 @@ def closing_lines(
     ]
 
 
-def closing_doubts(states: Counter[str], *, stature: float | None, told: float | None) -> list[str]:
+def closing_remarks(states: Counter[str], *, stature: float | None, height_m: float | None) -> list[str]:
     """What is unlikely in poses of these statuses (status -> frames); told: the stature that was given [m]."""
-    doubts = []
+    remarks = []
     low, high = _USUAL_M
-    if stature is not None and told is not None and abs(stature - told) > _TOLD * told:
-        doubts.append(
-            f"the stature is {stature:.2f} m, where {told:.2f} m was told: is the scale of depth or calibration right?"
+    if stature is not None and height_m is not None and abs(stature - height_m) > _STATURE_TOLERANCE * height_m:
+        remarks.append(
+            f"the stature is {stature:.2f} m, where {height_m:.2f} m was told: is the scale of depth or calibration right?"
         )
-    elif stature is not None and told is None and not low <= stature <= high:
-        doubts.append(f"the stature is {stature:.2f} m, which few people have ({low} to {high} m): is the scale right?")
+    elif stature is not None and height_m is None and not low <= stature <= high:
+        remarks.append(
+            f"the stature is {stature:.2f} m, which few people have ({low} to {high} m): is the scale right?"
+        )
     share = states["tracking"] / states.total()
     if share <= _LEAST_TRACKING:
-        doubts.append(
+        remarks.append(
             f"only {100 * share:.0f} % of the frames are tracking: look at --overlay look.mp4, and see {STATUS_PAGE}"
         )
-    return doubts
+    return remarks

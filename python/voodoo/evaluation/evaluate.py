@@ -201,9 +201,9 @@ def _task(how: Mapping[str, Any], path: Path) -> tuple[Score | PeopleScore, Fram
 def _score(
     recording: Recording, path: Path, selection: Selection, steps: Sequence[tuple[Any, ...]]
 ) -> tuple[Score, FrameTable]:
-    stamp, status, time, seen, joints, known, spread = zip(*steps, strict=True)
+    stamp, status, time, agreements, joints, known, spread = zip(*steps, strict=True)
     stamps, seconds, positions, measured, sigma = map(np.array, (stamp, time, joints, known, spread))
-    overlaps, within = (np.array([getattr(one, name) for one in seen]) for name in ("iou", "within"))
+    overlaps, within = (np.array([getattr(one, name) for one in agreements]) for name in ("iou", "within"))
     whole = reference_positions(recording, stamps)
     exact = None if recording.reference is None else recording.reference.exact
     reference = metrics.without_contradictions(whole) if exact is False else whole
@@ -220,7 +220,9 @@ def _score(
     without = metrics.without_offsets(positions, compared)
     class_without, _ = metrics.tracking_class(np.where(missed, NOWHERE_M, without), stamps, limit=limit)
     still = metrics.standing_still(reference, stamps)
-    distances, about = (np.concatenate([getattr(one, name) for one in seen]) for name in ("distances", "about_joints"))
+    distances, about = (
+        np.concatenate([getattr(one, name) for one in agreements]) for name in ("distances", "about_joints")
+    )
     left_out = float(1.0 - np.isfinite(reference).sum() / np.isfinite(whole).sum()) if exact is False else np.nan
     angle_error, angle_spread = metrics.angle_error(positions, compared)
     first_wait, first_error = _first_pose(stamps, status, whole, errors0)

@@ -36,10 +36,10 @@ _BONES = tuple(limb for limb in LIMBS if not limb[1].endswith("_hip"))
 _STAMP_TOLERANCE_S = 1e-6
 
 
-def places_of(names: Sequence[str], positions: FloatArray, wanted: Sequence[str] = JOINTS) -> FloatArray:
+def places_of(names: Sequence[str], positions: FloatArray, chosen_names: Sequence[str] = JOINTS) -> FloatArray:
     """Of positions (F, J, 3) those of the wanted joints; NaN where one is missing."""
-    chosen = np.full((len(positions), len(wanted), 3), np.nan)
-    for index, name in enumerate(wanted):
+    chosen = np.full((len(positions), len(chosen_names), 3), np.nan)
+    for index, name in enumerate(chosen_names):
         if name in names:
             chosen[:, index] = positions[:, names.index(name)]
     return chosen
@@ -207,7 +207,7 @@ def tracking_class(errors: FloatArray, stamps: FloatArray, *, limit: float) -> t
     )
     if not known.any():
         return None, lost
-    at_end = any(gone[seen][-1] for gone, seen in zip(lost.T, known.T, strict=True) if seen.any())
+    at_end = any(gone[is_known][-1] for gone, is_known in zip(lost.T, known.T, strict=True) if is_known.any())
     return (0 if at_end else 1 if lost.any() else 2), lost
 
 

@@ -27,13 +27,13 @@ TRANSFORMS, SCENE = "/tf", "/people"
 _JOINT_M = 0.04
 
 
-def library(wanted: object) -> ModuleType:
+def library(needed_by: object) -> ModuleType:
     """The package foxglove.
 
     Raises:
-        VoodooError: it is not installed; `wanted` needs it.
+        VoodooError: it is not installed; `needed_by` needs it.
     """
-    missing = f"{wanted}: expected foxglove-sdk, found none; pip install 'voodoo-tracker[foxglove]'"
+    missing = f"{needed_by}: expected foxglove-sdk, found none; pip install 'voodoo-tracker[foxglove]'"
     for part in ("channels", "messages"):
         installed(f"foxglove.{part}", missing)
     return installed("foxglove", missing)
@@ -57,7 +57,7 @@ class Channels:
         self._template_of = lru_cache(8)(self._make_template)
 
     @property
-    def are_wanted(self) -> bool:
+    def are_subscribed(self) -> bool:
         """Whether somebody receives them."""
         return bool(self._transforms.has_sinks() or self._scene.has_sinks())
 

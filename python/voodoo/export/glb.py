@@ -110,9 +110,9 @@ class _File:
             "skeleton": first,
             "inverseBindMatrices": self._array(inverse.reshape(-1, 16), "MAT4"),
         }
-        shown = {"name": f"{name}_mesh", "mesh": self._mesh(body, parts, color), "skin": self._add("skins", skin)}
+        visible = {"name": f"{name}_mesh", "mesh": self._mesh(body, parts, color), "skin": self._add("skins", skin)}
         person = self._add("nodes", {"name": name, "children": [first]})
-        self._scene["scenes"][0].setdefault("nodes", []).extend([person, self._add("nodes", shown)])
+        self._scene["scenes"][0].setdefault("nodes", []).extend([person, self._add("nodes", visible)])
         times = self._array(track.stamps - start, "SCALAR")
         turns = quaternions(Y_UP_LEFT @ posed.local() @ Y_UP_LEFT.T)
         for index in range(len(parts)):
@@ -124,9 +124,9 @@ class _File:
                 self._animate(first + index, "translation", times, offsets[:, index] @ Y_UP_LEFT.T)
         if not track.found.all() or track.stamps[0] > start:
             # Before and after the person's own frames, readers hold the first and the last value.
-            shown_at = np.r_[0.0, track.stamps - start] if track.stamps[0] > start else track.stamps - start
+            visible_from = np.r_[0.0, track.stamps - start] if track.stamps[0] > start else track.stamps - start
             sizes = np.r_[False, track.found] if track.stamps[0] > start else track.found
-            self._animate(person, "scale", self._array(shown_at, "SCALAR"), np.tile(sizes[:, None], 3), step=True)
+            self._animate(person, "scale", self._array(visible_from, "SCALAR"), np.tile(sizes[:, None], 3), step=True)
 
     def _mesh(self, body: Body, bones: Sequence[Bone], color: tuple[float, ...]) -> int:
         """All limbs at rest as one mesh; each vertex follows its limb."""

@@ -161,7 +161,7 @@ class Follower:
             self._front = FrontEnd(self._make(), **self._how)
 
 
-_SIGHTS, _LOOKS = 5, 50
+_SIGHTS, _MOST_DETECTIONS = 5, 50
 """After seeing the floor so often, or searching so many frames for it, the search ends."""
 
 
@@ -177,7 +177,7 @@ class Upright:
         self._live = live
         self._turn: Turn | None = None
         self._sight: FloorSight | None = None
-        self._seen: list[Estimate] = []
+        self._estimates: list[Estimate] = []
         self._steps = 0
 
     def of(self, step: Step) -> Turn:
@@ -191,15 +191,15 @@ class Upright:
             self._sight = FloorSight() if optical else None
         there = [one for one in step.estimates.values() if one.status != "searching"]
         self._steps += bool(there)
-        if not there or self._steps % EVERY or self._steps > _LOOKS * EVERY:
+        if not there or self._steps % EVERY or self._steps > _MOST_DETECTIONS * EVERY:
             return self._turn
-        self._seen.append(there[0])
+        self._estimates.append(there[0])
         if self._sight is not None:
             with suppress(VoodooError):  # tracking reports damage
-                self._sight.look(step.frame)
+                self._sight.observe(step.frame)
             if len(self._sight.planes) >= _SIGHTS and (floor := self._sight.floor) is not None:
                 self._turn, self._sight = by_floor(floor, optical=True), None
                 self._live.faults.log(f"outputs are turned upright {self._turn.words}")
-        if len(self._seen) == 2 * _SIGHTS and (words := lying_words(Track.of(self._seen), root, self._turn)):
+        if len(self._estimates) == 2 * _SIGHTS and (words := lying_words(Track.of(self._estimates), root, self._turn)):
             self._live.faults.log(words)
         return self._turn

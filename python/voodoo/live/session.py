@@ -108,7 +108,7 @@ class _Lane:
                 raise
             self._name(output, f"nobody receives: {error.strerror or error}")
         finally:
-            self.watch()
+            self.check_late()
             self._busy = None
         if output in self._named and time.monotonic() - self._named[output] > _BACK_S:
             del self._named[output]
@@ -119,7 +119,7 @@ class _Lane:
             self._on_message(f"{output.name}: {problem}")
         self._named[output] = time.monotonic()
 
-    def watch(self) -> None:
+    def check_late(self) -> None:
         """Name a receiver that holds a pose up."""
         output, began = self._busy or (None, 0.0)
         if output is not None and output.receiver and time.monotonic() - began > _LATE_S:
@@ -246,7 +246,7 @@ class Session:
         """
         self._thread.join(seconds)
         for lane in self._lanes:
-            lane.watch()
+            lane.check_late()
         self._raise()
         return self._thread.is_alive()
 

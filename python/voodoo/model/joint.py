@@ -114,12 +114,12 @@ def _problems(values: object, error: ValidationError, known: Collection[str]) ->
             parts.append(str(name if isinstance(name, str) else part))
         return ".".join(parts)
 
-    said = []
+    problems = []
     for item in error.errors(include_url=False):
         unknown = known and item["type"] == "extra_forbidden"
         words = f"unknown key; known are {', '.join(known)}" if unknown else expectation(item)
-        said.append(f"{key(item['loc'])}: {words}" if item["loc"] else words)
-    return said
+        problems.append(f"{key(item['loc'])}: {words}" if item["loc"] else words)
+    return problems
 
 
 _EXPECTED = {

@@ -52,7 +52,7 @@ class FloorSight:
         self._detector, self._up = Detector(), up
         self.planes: list[tuple[float, ...]] = []
 
-    def look(self, recorded: RecordedFrame) -> None:
+    def observe(self, recorded: RecordedFrame) -> None:
         """Search a frame.
 
         Raises:
@@ -76,12 +76,12 @@ class FloorSight:
         return (normal, height) if alike.mean() > 0.5 else None
 
 
-def seen_floor(recording: Recording) -> tuple[FloatArray, float] | None:
+def visible_floor(recording: Recording) -> tuple[FloatArray, float] | None:
     """The floor that a recording shows in its first seconds, in the root frame; see `FloorSight`."""
     sight = FloorSight(up=None if recording.info().camera_root else (0.0, 0.0, 1.0))
     try:
         for recorded in islice(recording, 0, _FRAMES, EVERY):
-            sight.look(recorded)
+            sight.observe(recorded)
     except VoodooError:
         pass  # tracking reports damage; what was seen before it counts
     return sight.floor

@@ -121,7 +121,7 @@ def follow(
     def solved() -> Iterator[Solved]:
         near: FloatArray | Posture = start
         last: Mapping[str, FloatArray] = {name: tracker.estimate.joints[name] for name in chain.site_names}
-        first, seen = True, False
+        first, any_images = True, False
         for recorded in recording:
             began = time.perf_counter()
             targets = positions.at(recorded.stamp, known, within=_SAME_TIME_S)
@@ -141,13 +141,13 @@ def follow(
             else:
                 posture = solve(chain, targets, images=images, start=start, options=options)
             last, near = posture.joints, posture
-            first, seen = False, seen or posture.images > 0
+            first, any_images = False, any_images or posture.images > 0
             if regions is not None and targets:
                 regions.learn(colors, posture.world_from_limb)
             truth = positions.at(recorded.stamp, others, within=_SAME_TIME_S)
             errors = {name: float(np.linalg.norm(posture.joints[name] - place)) for name, place in truth.items()}
             yield Solved(_track(recorded.stamp, posture), errors, time.perf_counter() - began)
-        if regions is not None and not seen:
+        if regions is not None and not any_images:
             raise VoodooError(f"{recording.name}: expected color pictures, found none; --pictures says where to look")
 
     return solved()

@@ -144,15 +144,15 @@ class BagFolder(DirectoryReader):
 
     def messages(self, connections: Collection[Connection], start: int | None = None) -> Iterator[Item]:  # type: ignore[override]
         """Messages in the order of the files."""
-        wanted = {(item.topic, item.msgtype): item for item in connections}
+        chosen = {(item.topic, item.msgtype): item for item in connections}
         for storage in self.storages:
-            own = [item for item in storage.connections if (item.topic, item.msgtype) in wanted]
+            own = [item for item in storage.connections if (item.topic, item.msgtype) in chosen]
             found: Iterator[Any] = storage.messages(own, start) if own else iter(())
             for item, time, data in found:
                 if self.metadata.compression_mode == "message" and isinstance(data, bytes):
                     unpack = partial(self._unpacking.unpack, data, "zstd")
                     data = or_error(unpack, f"{self._folder}, topic {item.topic}", "a message compressed by zstd")
-                yield wanted[item.topic, item.msgtype], time, data
+                yield chosen[item.topic, item.msgtype], time, data
 
 
 BagFile: TypeAlias = Ros1File | BagFolder | McapFile | SqliteFile

@@ -61,10 +61,10 @@ class EmptyScene:
         beside = place if place.is_dir() else place.parent
         folders = (beside / FOLDER, beside.parent / FOLDER)
         self._folder = next((one for one in folders if one.is_dir()), None) if given is None else Path(given)
-        self._cameras, told = cameras, {sensor: own for sensor, (_, own) in cameras.items()}
-        self._files = {} if self._folder is None else pictures_of(self._folder, told)
+        self._cameras, folders_of = cameras, {sensor: own for sensor, (_, own) in cameras.items()}
+        self._files = {} if self._folder is None else pictures_of(self._folder, folders_of)
         if given is not None and not self._files:
-            names = [f"{sensor}: {', '.join(dict.fromkeys(own))}" for sensor, own in told.items()]
+            names = [f"{sensor}: {', '.join(dict.fromkeys(own))}" for sensor, own in folders_of.items()]
             listed = "; ".join(names) or "no camera"
             raise RecordingError(
                 f"{given}: expected pictures NAME.png or NAME_0.png, ... by a camera's name ({listed}), found none"

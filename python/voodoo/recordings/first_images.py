@@ -119,7 +119,7 @@ def depths_of(images: Sequence[FirstImage]) -> DepthRange | None:
     return next((image.depths for image in images if image.depths is not None), None)
 
 
-def doubts(about: RecordingInfo, left_out: LeftOut, images: Sequence[FirstImage] = ()) -> list[str]:
+def warnings(about: RecordingInfo, left_out: LeftOut, images: Sequence[FirstImage] = ()) -> list[str]:
     """What is not right with a recording, after its first images were read."""
     found = [f"left out {count} {reason}: {left_out.first[reason]}" for reason, count in left_out.counts.items()]
     found += left_out.notes

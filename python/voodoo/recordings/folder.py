@@ -155,10 +155,10 @@ class FrameClock:
             RecordingError: a name that is not a number.
         """
         stems = [file.stem for file in files]
-        told = [re.findall(r"\d+(?:\.\d+)?", stem) for stem in stems]
+        found = [re.findall(r"\d+(?:\.\d+)?", stem) for stem in stems]
         if not all(stem.replace(".", "", 1).isdigit() for stem in stems):
-            if {len(words) for words in told} == {1}:  # depth_0003
-                stems = [words[0] for words in told]
+            if {len(words) for words in found} == {1}:  # depth_0003
+                stems = [words[0] for words in found]
             elif (last := numbers_of(files)) is not None:
                 stems = [f"{number:09d}" for number in last]
         numbers = [_stamp(stem, str(file)) for stem, file in zip(stems, files, strict=True)]

@@ -175,8 +175,8 @@ class WithKeypoints(Around):
             for rows in found
         ]
         self._layout, notes = taken_layout(people, layout)
-        self._said = (*notes, *self._checked())
-        self.assumed = (*self.assumed, *self._said)
+        self._notes = (*notes, *self._checked())
+        self.assumed = (*self.assumed, *self._notes)
 
     def _checked(self) -> tuple[str, ...]:
         """Check the keypoints of the first frames against calibration and depth."""
@@ -212,4 +212,4 @@ class WithKeypoints(Around):
 
     def info(self) -> RecordingInfo:
         """The summary of the recording, with the keypoints."""
-        return self._info(self._files, f"{self._layout} keypoints", self._said)
+        return self._info(self._files, f"{self._layout} keypoints", self._notes)

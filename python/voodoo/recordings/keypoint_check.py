@@ -118,15 +118,15 @@ def check_keypoints(where: object, instants: Sequence[Instant]) -> tuple[str, ..
         raise RecordingError(
             f"{where}: expected keypoints inside of their pictures, found {outside:.0%} outside; {reason}"
         )
-    said = []
+    notes = []
     if found.distance > RIGHT_M:
-        said.append(f"two cameras' rays to a keypoint meet within {_long(found.distance)}; 3 cm would be usual")
+        notes.append(f"two cameras' rays to a keypoint meet within {_long(found.distance)}; 3 cm would be usual")
     for index, image in enumerate(instants[0] if instants else ()):
         own = agreement(instants, only=index).distance
         if len(instants[0]) > 2 and own > WRONG_M:
             away = f"its rays pass those of the other cameras at {_long(own)}; do its keypoints fit its calibration?"
-            said.append(f"{image.sensor}: {away}")
-    return tuple(said)
+            notes.append(f"{image.sensor}: {away}")
+    return tuple(notes)
 
 
 def taken_layout(people: Sequence[FloatArray], asked: str | None) -> tuple[str, tuple[str, ...]]:
@@ -139,10 +139,10 @@ def taken_layout(people: Sequence[FloatArray], asked: str | None) -> tuple[str, 
         return asked or "body25b", ()
     if asked is None:
         fit = " and ".join(name for name, layout in LAYOUTS.items() if layout.count == len(people[0]))
-        said = f"{len(people[0])} keypoints fit {fit}, and the persons do not tell: taken for {shape}; --layout says another"
-        return shape, () if certain else (said,)
-    said = f"the layout is {asked}, as asked for, but the persons have the shape of {shape}"
-    return asked, (said,) if certain and shape != asked else ()
+        notes = f"{len(people[0])} keypoints fit {fit}, and the persons do not tell: taken for {shape}; --layout says another"
+        return shape, () if certain else (notes,)
+    notes = f"the layout is {asked}, as asked for, but the persons have the shape of {shape}"
+    return asked, (notes,) if certain and shape != asked else ()
 
 
 def agreement(instants: Sequence[Instant], change: Change = lambda at, _: at, *, only: int | None = None) -> Agreement:
@@ -201,7 +201,7 @@ def _meeting(
 def _reading(instants: Sequence[Instant], *, sizes: Sequence[float]) -> tuple[Agreement, str] | None:
     """Another reading of the keypoints with which the rays meet best, in words; None: with none they do."""
     tried = [(agreement(instants, change), words) for words, change in readings(instants[0][0].camera, sizes)]
-    tried += [(agreement(_exchanged(instants, it)), _order_words(instants[0], it)) for it in _orders(instants[0])]
+    tried += [(agreement(_reordered(instants, it)), _order_words(instants[0], it)) for it in _orders(instants[0])]
     tried = [(each, words) for each, words in tried if _human(each) and each.distance < RIGHT_M]
     least = min((each.distance for each, _ in tried), default=np.inf)
     return next((one for one in tried if one[0].distance < least + _ALIKE_M), None)
@@ -250,7 +250,7 @@ def _orders(cameras: Instant) -> Iterator[tuple[int, ...]]:
         yield tuple(b if item == a else a if item == b else item for item in same)
 
 
-def _exchanged(instants: Sequence[Instant], order: tuple[int, ...]) -> list[Instant]:
+def _reordered(instants: Sequence[Instant], order: tuple[int, ...]) -> list[Instant]:
     """The instants with the people of image `order[i]` in camera i."""
     return [
         [replace(image, people=instant[other].people) for image, other in zip(instant, order, strict=True)]
@@ -321,10 +321,12 @@ def _standing_out(views: Sequence[tuple[KeypointImage, FloatArray]], change: Cha
             middle, along = (a + b) / 2.0, b - a
             across = np.column_stack([-along[:, 1], along[:, 0]]) / np.maximum(np.hypot(*along.T), 1e-9)[:, None]
             depth = _at(nearest, middle)
-            seen = np.isfinite(depth)
-            aside = np.where(seen, image.camera.fx * _BESIDE_M / np.where(seen, depth, 1.0), 0.0)[:, None] * across
+            visible = np.isfinite(depth)
+            aside = (
+                np.where(visible, image.camera.fx * _BESIDE_M / np.where(visible, depth, 1.0), 0.0)[:, None] * across
+            )
             behind = np.maximum(_at(nearest, middle + aside), _at(nearest, middle - aside))
-            near += int((seen & (behind > np.where(seen, depth, 0.0) + _FARTHER_M)).sum())
+            near += int((visible & (behind > np.where(visible, depth, 0.0) + _FARTHER_M)).sum())
             count += len(a)
     return near / count if count >= _FEWEST else None
 

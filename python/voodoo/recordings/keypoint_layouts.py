@@ -123,7 +123,7 @@ def layout_of(name: str) -> Layout:
     return LAYOUTS[name]
 
 
-_MIDDLE, _DOUBT = 0.045, 0.01
+_MIDDLE, _UNCERTAIN = 0.045, 0.01
 """Distance of a keypoint from the middle of two others, by the size of the person, below which it is that middle. It is 0.02 and
 less for the midpoints of a network, 0.06 and more for other joints; the second number is the range in which both are possible."""
 
@@ -145,17 +145,17 @@ def layout_by_shape(people: Sequence[npt.NDArray[np.float64]]) -> tuple[str | No
     if not away:
         return second, False
     middle = float(np.median(away))
-    return first if middle < _MIDDLE else second, abs(middle - _MIDDLE) > _DOUBT
+    return first if middle < _MIDDLE else second, abs(middle - _MIDDLE) > _UNCERTAIN
 
 
 def _off_middle(rows: npt.NDArray[np.float64], midpoints: Sequence[tuple[int, int, int]]) -> float:
     """Greatest distance of the midpoints from the middle of their two keypoints, by the size of the person; NaN: not seen."""
     import numpy as np
 
-    seen = rows[:, 2] > 0.0
-    used = np.array([each for each in midpoints if seen[list(each)].all()])
+    visible = rows[:, 2] > 0.0
+    used = np.array([each for each in midpoints if visible[list(each)].all()])
     if not len(used):
         return np.nan
     middle, a, b = (rows[used[:, column], :2] for column in range(3))
-    size = float(np.linalg.norm(np.ptp(rows[seen, :2], axis=0)))
+    size = float(np.linalg.norm(np.ptp(rows[visible, :2], axis=0)))
     return float(np.linalg.norm(middle - (a + b) / 2.0, axis=1).max()) / size if size > 0.0 else np.nan

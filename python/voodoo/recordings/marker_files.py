@@ -94,9 +94,9 @@ class MarkerRecording(Recording):
         sites, positions = content.of(names)
         self._likely = standing_along(sites, positions)
         if self.map.y_up is None:
-            self._up, half_told = self._up_of(content)
+            self._up, assumed_axes = self._up_of(content)
         else:
-            self._up, half_told = "+Y" if self.map.y_up else "+Z", ()
+            self._up, assumed_axes = "+Y" if self.map.y_up else "+Z", ()
         self._notes = (f"up is {self._up} of the file",)
         self._positions = positions @ Z_UP_FROM[self._up].T
         self._sites, self._stamps = sites, content.stamps
@@ -108,8 +108,8 @@ class MarkerRecording(Recording):
         first = {name: at for name, at in self._at(0).items() if name not in self.map.limbs}
         start = Start(joints={name: (float(x), float(y), float(z)) for name, (x, y, z) in first.items()})
         self.start = None if bare or not first else start
-        doubts = self._doubts() if self.map.y_up is None else ()
-        self.assumed = (*content.remarks, *half_told, *self._unnamed(content.names), *doubts)
+        warnings = self._warnings() if self.map.y_up is None else ()
+        self.assumed = (*content.remarks, *assumed_axes, *self._unnamed(content.names), *warnings)
 
     def _at(self, index: int) -> dict[str, FloatArray]:
         rows = zip(self._sites, self._positions[index], strict=True)
@@ -133,7 +133,7 @@ class MarkerRecording(Recording):
         words = f"X_SCREEN without Y_SCREEN says only that {level} is level; {up} is taken for up, {why}"
         return up, (f"{self.path.name}: {words}",)
 
-    def _doubts(self) -> tuple[str, ...]:
+    def _warnings(self) -> tuple[str, ...]:
         """What speaks against the axis that is taken for up."""
         likely = self._likely
         heights = self._positions[..., 2][np.isfinite(self._positions[..., 2])]

@@ -138,7 +138,7 @@ def read_trc(path: str | Path) -> MarkerTrajectories:
     if not np.isfinite(stamps).all() or (np.diff(stamps) <= 0.0).any():
         raise RecordingError(f"{path}: expected rising times in the second column, found others")
     positions = table[:, 2:].reshape(len(rows), markers, 3) * unit
-    return MarkerTrajectories(stamps, _without_subject(names), _seen(positions), rate, remarks=remarks)
+    return MarkerTrajectories(stamps, _without_subject(names), _observed(positions), rate, remarks=remarks)
 
 
 def _meters(unit: str) -> float:
@@ -197,7 +197,7 @@ def read_c3d(path: str | Path) -> MarkerTrajectories:
     if right and up and right[1] == up[1]:
         remarks = (f"{path.name}: X_SCREEN {right} and Y_SCREEN {up} are the same axis, and not used",)
         right = up = None
-    return MarkerTrajectories(stamps, _without_subject(names), _seen(positions), rate, up, right, remarks)
+    return MarkerTrajectories(stamps, _without_subject(names), _observed(positions), rate, up, right, remarks)
 
 
 def _axis(screen: Any) -> str | None:  # noqa: ANN401 - of a library without types
@@ -207,7 +207,7 @@ def _axis(screen: Any) -> str | None:  # noqa: ANN401 - of a library without typ
     return word if word in Z_UP_FROM else None
 
 
-def _seen(positions: FloatArray) -> FloatArray:
+def _observed(positions: FloatArray) -> FloatArray:
     """NaN for markers that were not seen, for which exporters write zeros: none lies exactly in the origin."""
     positions[~np.isfinite(positions).all(axis=2) | (positions == 0.0).all(axis=2)] = np.nan
     return positions

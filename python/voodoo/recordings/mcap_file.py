@@ -98,16 +98,16 @@ class McapFile(McapReader):
             return
         if len({chunk.chunk_start_offset for chunk in self.chunks}) != len(self.chunks):
             raise RecordingError(f"{self._file}: expected every chunk once in the index, found one again")
-        wanted = {item.id: item for item in connections}
+        chosen = {item.id: item for item in connections}
         first = -1 if start is None else start
         # The first item of every chunk is its start, so that a chunk is unpacked only when its time has come.
-        is_back = self._is_back(wanted)
+        is_back = self._is_back(chosen)
         plausible = iter(range(min(_MOST_LOST, self._file.stat().st_size // _INDEX_BYTES)))
         sources = [
-            self._of_chunk(chunk, wanted, first, plausible, as_written=is_back)
+            self._of_chunk(chunk, chosen, first, plausible, as_written=is_back)
             for chunk in self._in_file()
             if first <= chunk.message_end_time
-            and (not chunk.message_index_offsets or any(chunk.channel_count.get(one, 0) for one in wanted))
+            and (not chunk.message_index_offsets or any(chunk.channel_count.get(one, 0) for one in chosen))
         ]
         in_turn = is_back or self._longest_step_back() <= 0
         for _, _, item in itertools.chain(*sources) if in_turn else heapq.merge(*sources, key=lambda entry: entry[:2]):
@@ -123,18 +123,18 @@ class McapFile(McapReader):
         pairs = itertools.pairwise(self._in_file())
         return max((before.message_end_time - chunk.message_start_time for before, chunk in pairs), default=math.inf)
 
-    def _is_back(self, wanted: Collection[int]) -> bool:
+    def _is_back(self, chosen: Collection[int]) -> bool:
         """Whether the clock of the recorder was set back; chunks are unpacked only where times of two are apart."""
         if self._longest_step_back() < BACK_S * 1e9:
             return False
         try:
             read = (entry for chunk in self._in_file() for entry in _messages(self._content(chunk)))
-            return falls((one, time) for one, time, _, _ in read if one in wanted)
+            return falls((one, time) for one, time, _, _ in read if one in chosen)
         except Exception:
             return False  # the damage is told where the messages are read
 
     def _of_chunk(
-        self, chunk: ChunkInfo, wanted: dict[int, Connection], first: int, plausible: Iterator[int], *, as_written: bool
+        self, chunk: ChunkInfo, chosen: dict[int, Connection], first: int, plausible: Iterator[int], *, as_written: bool
     ) -> Iterator[tuple[int, int, Item | None]]:
         yield chunk.message_start_time, 0, None
         content, found = b"", []
@@ -143,17 +143,17 @@ class McapFile(McapReader):
             with reading(self._file, f"a sound chunk at byte {chunk.chunk_start_offset}"):
                 content = self._content(chunk)
                 for one, time, begin, end in _messages(content):
-                    if one in wanted and first <= time:
+                    if one in chosen and first <= time:
                         found.append((time, one, begin, end))
         except RecordingError as error:
             lost = RecordingError(str(error), reason=DAMAGED)
         if not as_written:
             found.sort(key=lambda entry: entry[0])
         for time, one, begin, end in found:
-            yield time, chunk.chunk_start_offset, (wanted[one], time, content[begin:end])
+            yield time, chunk.chunk_start_offset, (chosen[one], time, content[begin:end])
         if lost is None:
             return
-        for one, connection in wanted.items():
+        for one, connection in chosen.items():
             count = chunk.channel_count.get(one, 0) - sum(entry[1] == one for entry in found)
             for _ in itertools.islice(plausible, max(count, 0)):
                 yield chunk.message_end_time, chunk.chunk_start_offset, (connection, chunk.message_end_time, lost)

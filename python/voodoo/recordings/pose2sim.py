@@ -199,11 +199,11 @@ def _rows_of(path: Path, folders: Sequence[Path]) -> tuple[list[tuple[Path | Non
     gapless = all(max(each) - min(each) + 1 == len(each) for each in numbers if each)
     differ = any(each != numbers[0] for each in numbers)
     if len(numbers) < len(files) or (len(counts) == 1 and (gapless or not common or not differ)):
-        said = "the cameras' keypoint files have different numbers: they are paired in their order" if differ else ""
+        note = "the cameras' keypoint files have different numbers: they are paired in their order" if differ else ""
         if len(numbers) < len(files):
             unnumbered = "the names of keypoint files have no numbers: they are taken in the order of names"
-            said = "" if counts == {1} else unnumbered
-        return list(zip(*files, strict=True)), (said,) if said else ()
+            note = "" if counts == {1} else unnumbered
+        return list(zip(*files, strict=True)), (note,) if note else ()
     of = [dict(zip(each, own, strict=True)) for each, own in zip(numbers, files, strict=True)]
     lacking = ", ".join(f"{folder.name} {len(union) - len(own)}" for folder, own in zip(folders, files, strict=True))
     return [tuple(each.get(number) for each in of) for number in union], (

@@ -180,17 +180,17 @@ class SqliteFile:
 
     def messages(self, connections: Collection[Connection], start: int | None = None) -> Iterator[Item]:
         """See bag_file; those in a damaged part of the file are errors."""
-        wanted = {item.id: item for item in connections}
-        places = ",".join("?" * len(wanted))
+        chosen = {item.id: item for item in connections}
+        places = ",".join("?" * len(chosen))
         rows = self._rows(
             f"SELECT rowid, topic_id, timestamp FROM messages WHERE topic_id IN ({places}) AND timestamp >= ?",
-            (*wanted, -(2**63) if start is None else start),
+            (*chosen, -(2**63) if start is None else start),
         )
         order = sorted(rows)
         if not falls((topic, time) for _, topic, time in order):
             order.sort(key=lambda row: row[2])
         for row, topic, time in order:
-            yield wanted[topic], time, or_error(partial(self._data, row), self.path, f"message {row}", reason=DAMAGED)
+            yield chosen[topic], time, or_error(partial(self._data, row), self.path, f"message {row}", reason=DAMAGED)
 
     def _data(self, row: int) -> bytes:
         assert self._base is not None

@@ -108,9 +108,9 @@ def depth_points(
     valid = np.zeros(depth.image.shape, dtype=bool)
     valid[rows, columns] = np.isfinite(z) & (z > 0.0) & (z >= near) & (z <= far)
     rays = depth.camera.rays().reshape(*valid.shape, 2)[valid]
-    seen = np.isfinite(rays).all(axis=1)
-    z, rays = z[valid[rows, columns]][seen], rays[seen]
-    valid[valid] = seen
+    finite = np.isfinite(rays).all(axis=1)
+    z, rays = z[valid[rows, columns]][finite], rays[finite]
+    valid[valid] = finite
     return transform(depth.root_from_sensor, np.column_stack([rays, np.ones(len(rays))]) * z[:, None]), valid.ravel()
 
 

@@ -27,7 +27,7 @@ _LINES = (
     *(("humanoid_root", *(f"{side}_{joint}" for joint in ("hip", "knee", "ankle", "toe"))) for side in "lr"),
 )
 """Joints of the default humans that are drawn as lines; a body with other joints is drawn as points."""
-_MOST_SHOWN = 300
+_MOST_FRAMES = 300
 """Frames of the animation; more make the page slow."""
 _TOGETHER = """<script>
 const film = document.getElementById("film");
@@ -119,15 +119,17 @@ def _figure(track: Track) -> Any:  # noqa: ANN401 - Plotly
     scale = [[place, color] for i, color in enumerate(_LIMB_COLORS.values()) for place in (i / 4, (i + 1) / 4)]
     if codes:
         names, text = list(track.limb_status), list(track.limb_status.values())
-        look: dict[str, Any] = {"colorscale": scale, "zmin": -0.5, "zmax": 3.5, "showscale": False}
-        figure.add_trace(go.Heatmap(x=times, y=names, z=codes, text=text, hoverinfo="x+y+text", **look), row=1, col=2)
+        heatmap_style: dict[str, Any] = {"colorscale": scale, "zmin": -0.5, "zmax": 3.5, "showscale": False}
+        figure.add_trace(
+            go.Heatmap(x=times, y=names, z=codes, text=text, hoverinfo="x+y+text", **heatmap_style), row=1, col=2
+        )
     joints = track.joint_names[: track.joint_sigma.shape[1]]
-    angles, unsure = np.degrees(track.angles), np.degrees(track.angle_sigma)
+    angles, sigmas = np.degrees(track.angles), np.degrees(track.angle_sigma)
     for number, (name, column) in enumerate(zip(track.angle_names, angles.T, strict=True)):
         color = _COLORS[number % len(_COLORS)]
         how: dict[str, Any] = {"mode": "lines", "showlegend": False, "line": {"color": color}}
-        if unsure.size:
-            around = unsure[:, number]
+        if sigmas.size:
+            around = sigmas[:, number]
             known = np.isfinite(column) & np.isfinite(around)
             edge = np.concatenate([(column - around)[known], (column + around)[known][::-1]])
             there = np.concatenate([times[known], times[known][::-1]])
@@ -138,13 +140,13 @@ def _figure(track: Track) -> Any:  # noqa: ANN401 - Plotly
     for name, column in zip(joints, track.joint_sigma.T, strict=True):
         figure.add_trace(go.Scatter(x=times, y=column, name=name, mode="lines", showlegend=False), row=3, col=2)
     figure.add_trace(go.Scatter(x=times, y=track.residual, mode="lines", showlegend=False), row=4, col=2)
-    shown = np.unique(np.linspace(0, len(track) - 1, min(len(track), _MOST_SHOWN)).round().astype(int))
+    chosen = np.unique(np.linspace(0, len(track) - 1, min(len(track), _MOST_FRAMES)).round().astype(int))
     figure.frames = [
         go.Frame(data=[_drawn(paths[index])], traces=[0], name=f"{times[index]:.2f}", layout=_cursor(times[index]))
-        for index in shown
+        for index in chosen
     ]
     steps = [{"label": one.name, "method": "animate", "args": [[one.name], _how(0)]} for one in figure.frames]
-    pause = 1000.0 * float(times[-1]) / max(len(shown) - 1, 1)
+    pause = 1000.0 * float(times[-1]) / max(len(chosen) - 1, 1)
     buttons = [
         {"label": "play", "method": "animate", "args": [None, _how(pause)]},
         {"label": "stop", "method": "animate", "args": [[None], _how(0)]},

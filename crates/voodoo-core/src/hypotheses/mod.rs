@@ -27,7 +27,7 @@ use rough::{Extremity, RoughSearch};
 use unexplained::Unexplained;
 
 /// Cost of an unexplained patch below which a frame shows clearly more than the body: 7 % of its points, where 5 % are usual.
-const UNLIKE_FRAME: f64 = 0.85;
+const LARGE_EXCESS: f64 = 0.85;
 
 /// Tests every arm and leg in every frame.
 #[derive(Debug, Default)]
@@ -58,8 +58,8 @@ impl Hypotheses {
     }
 
     /// Whether it left clearly more.
-    pub(crate) fn unlike(&self) -> bool {
-        self.unexplained.clutter < UNLIKE_FRAME
+    pub(crate) fn has_large_excess(&self) -> bool {
+        self.unexplained.clutter < LARGE_EXCESS
     }
 
     /// Tests every arm and leg. Where the frame contradicts one, proposes and refines alternatives, and accepts one that explains

@@ -20,9 +20,9 @@ const MOST_TOGETHER: usize = 4;
 impl People {
     /// Searches for new persons: in the frame's detections that show nobody who is tracked and where these are in its images, and in
     /// pixels that no person explains.
-    pub(super) fn find_new(&mut self, frame: &Frame, shown: &[Option<usize>]) {
+    pub(super) fn find_new(&mut self, frame: &Frame, of_detection: &[Option<usize>]) {
         self.tentative.prune(frame.stamp);
-        for (detection, _) in frame.detections.iter().zip(shown).filter(|(_, shown)| shown.is_none()) {
+        for (detection, _) in frame.detections.iter().zip(of_detection).filter(|(_, person)| person.is_none()) {
             let fitted = self.detected_body().fit(&sites_of(detection.positions), true);
             let place = fitted.ok().and_then(|(_, poses)| poses.first().map(|root| root.translation));
             if let Some(place) = place.filter(|place| self.is_requested(frame, *place)) {
@@ -36,7 +36,7 @@ impl People {
         let mut confirmed = self.tentative.take_confirmed(frame.stamp);
         confirmed.retain(|track| !self.is_part_of_tracked(frame, track));
         let sums = self.tentative.updated_at(frame.stamp).map(|track| track.log_odds);
-        self.refusal = sums.max_by(f64::total_cmp).map(|log_odds| Refusal::Doubtful { log_odds });
+        self.refusal = sums.max_by(f64::total_cmp).map(|log_odds| Refusal::LowConfidence { log_odds });
         if !confirmed.is_empty() {
             self.associate(frame, &confirmed);
         }

@@ -73,10 +73,10 @@ impl Clothes {
 
     /// The mean frequency of each color over the observed halves of the body; `None` if neither was observed.
     fn colors(&self) -> Option<Vec<f32>> {
-        let seen: Vec<&Vec<f32>> =
+        let halves: Vec<&Vec<f32>> =
             self.worn.iter().filter(|half| half.updates > 0.0).map(|half| &half.frequencies).collect();
-        let mean = |bin| seen.iter().map(|half| half[bin]).sum::<f32>() / seen.len() as f32;
-        Some((0..seen.first()?.len()).map(mean).collect())
+        let mean = |bin| halves.iter().map(|half| half[bin]).sum::<f32>() / halves.len() as f32;
+        Some((0..halves.first()?.len()).map(mean).collect())
     }
 }
 

@@ -176,8 +176,8 @@ impl People {
             self.scene.known.register(frame);
         }
         self.assign_pixels(frame);
-        let shown = self.match_detections(frame);
-        self.follow(frame, own, &shown);
+        let of_detection = self.match_detections(frame);
+        self.follow(frame, own, &of_detection);
         for person in &self.persons {
             if let Some((image, pixels)) = person.tracker.moved_to.as_ref().filter(|_| person.present) {
                 self.scene.known.release(frame, *image, pixels);
@@ -191,7 +191,7 @@ impl People {
             self.assignment.release(number..=number);
         }
         self.prune_tracks();
-        self.find_new(frame, &shown);
+        self.find_new(frame, &of_detection);
         // Persons who have been absent for too long are deleted.
         let forget_after = self.options.forget_after;
         self.persons
@@ -224,12 +224,12 @@ impl People {
         };
         let costs = |detection| tracked.iter().map(|number| distance(detection, &self.persons[*number])).collect();
         let costs: Vec<Vec<f64>> = frame.detections.iter().map(costs).collect();
-        let shown = assign::assign(&costs, |_| SAME_PERSON);
-        shown.into_iter().map(|column| column.map(|column| tracked[column])).collect()
+        let assigned = assign::assign(&costs, |_| SAME_PERSON);
+        assigned.into_iter().map(|column| column.map(|column| tracked[column])).collect()
     }
 
     /// Steps every tracker with its own pixels and points, and with the detections that show the person.
-    fn follow(&mut self, frame: &Frame, own: &[(usize, Frame)], shown: &[Option<usize>]) {
+    fn follow(&mut self, frame: &Frame, own: &[(usize, Frame)], of_detection: &[Option<usize>]) {
         let (assignment, scene) = (&self.assignment, &self.scene.known);
         let nothing = Frame::empty(frame.stamp);
         let work = |(number, person): (usize, &mut Person)| {
@@ -237,7 +237,7 @@ impl People {
                 let ownership = assignment.ownership(number, scene);
                 let own = own.iter().find(|(id, _)| *id == person.id).map_or(&nothing, |(_, own)| own);
                 let count = person.tracker.body().sites().len();
-                let detection = shown.iter().position(|shown| *shown == Some(number));
+                let detection = of_detection.iter().position(|person| *person == Some(number));
                 let detected = detection.map_or(&[][..], |detection| frame.detections[detection].positions);
                 let detected: Vec<_> = detected.iter().filter(|of| of.site < count).copied().collect();
                 let positions = joined(frame.positions, own.positions);

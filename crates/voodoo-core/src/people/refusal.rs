@@ -7,7 +7,7 @@ use crate::relocalize::ENOUGH_ODDS;
 /// ```
 /// use voodoo_core::Refusal;
 ///
-/// let words = Refusal::Doubtful { log_odds: 1.5 }.to_string();
+/// let words = Refusal::LowConfidence { log_odds: 1.5 }.to_string();
 /// assert!(words.starts_with("log odds of 1.5"));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -15,7 +15,7 @@ use crate::relocalize::ENOUGH_ODDS;
 pub enum Refusal {
     /// The detections so far are not certain enough.
     #[error("log odds of {log_odds:.1} that it is a person, expected {ENOUGH_ODDS:.1} before it is tracked")]
-    Doubtful {
+    LowConfidence {
         /// Sum of their log odds.
         log_odds: f64,
     },

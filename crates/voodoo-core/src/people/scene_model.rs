@@ -63,20 +63,20 @@ impl SceneModel {
                 learned += image.camera.width();
                 let (mut new, mut width) = (0, 0.0);
                 for index in row * image.camera.width()..(row + 1) * image.camera.width() {
-                    let seen = image.depth(index).filter(|_| owners[index] == NO_OWNER);
+                    let depth = image.depth(index).filter(|_| owners[index] == NO_OWNER);
                     // Something new is clearly before the known scene, or where nothing was seen before.
                     let is_new = |z: &f32| {
                         known[index] == 0.0 && pending[index] == 0.0
                             || *z < known[index] - DEPTH_STEP && !Background::contains(known[index], *z)
                     };
-                    match seen.filter(is_new) {
+                    match depth.filter(is_new) {
                         Some(z) => (new, width) = (new + 1, width + f64::from(z) / image.camera.focal()[0]),
                         None => (new, width) = (0, 0.0),
                     }
                     if width >= NEW_WIDTH {
                         unexplained += std::mem::take(&mut new);
                     }
-                    let Some(z) = seen else { continue };
+                    let Some(z) = depth else { continue };
                     learn_pixel(&mut known[index], &mut pending[index], &mut frames[index], z);
                 }
             }

@@ -46,7 +46,7 @@ pub(crate) struct Reasons {
     /// The body may be anywhere.
     pub(crate) anywhere: bool,
     /// The person's surface is not that of the body, for example in a skirt: every frame needs a detection.
-    pub(crate) unlike: bool,
+    pub(crate) large_excess: bool,
 }
 
 /// Result of comparing a detection with the tracked pose.
@@ -109,7 +109,7 @@ impl DetectionCheck {
 
     /// Counts a frame and returns whether the detector is due for a person beside so many others.
     pub(super) fn is_due(&mut self, stamp: f64, reasons: Reasons, others: usize) -> bool {
-        let Reasons { uncertain, anywhere, unlike } = reasons;
+        let Reasons { uncertain, anywhere, large_excess } = reasons;
         let new_track = self.is_new(stamp);
         self.since = self.since.or(Some(stamp));
         let waited = |wait: f64| self.last_detection.is_none_or(|last| stamp - last >= wait);
@@ -117,7 +117,7 @@ impl DetectionCheck {
         if self.counts {
             self.last_detection = Some(stamp);
         }
-        self.counts || unlike
+        self.counts || large_excess
     }
 
     /// Compares a detection with the trunk at these poses, whose frame has its origin at `origin` in the world.
@@ -170,7 +170,7 @@ mod tests {
 
     #[test]
     fn an_unlike_person_is_detected_in_every_frame_and_few_of_these_count_against_the_person() {
-        let reasons = Reasons { uncertain: true, unlike: true, ..Reasons::default() };
+        let reasons = Reasons { uncertain: true, large_excess: true, ..Reasons::default() };
         let mut check = DetectionCheck::default();
         check.is_due(0.0, Reasons::default(), 0);
         let mut counted = 0;

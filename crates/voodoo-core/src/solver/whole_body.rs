@@ -164,10 +164,10 @@ impl WholeBody {
         for leg in extremities.iter().filter(|chain| chain.leg) {
             let trunk = body.parent(leg.upper).map_or(Quat::IDENTITY, |trunk| predicted[trunk].rotation);
             let rotations = leg.turned(body, trunk, leg.standing(body, predicted, floor));
-            let shown = |limb: &usize| correspondences.limbs[*limb].weighed().0 + self.edges[*limb];
-            let mut measured = leg.ends.iter().map(shown).sum::<f64>();
+            let visible = |limb: &usize| correspondences.limbs[*limb].weighed().0 + self.edges[*limb];
+            let mut measured = leg.ends.iter().map(visible).sum::<f64>();
             for (limb, rotation) in [leg.lower, leg.upper].into_iter().zip(rotations.into_iter().rev()) {
-                measured += shown(&limb);
+                measured += visible(&limb);
                 let fraction = to_rest(context, LEG_TO_REST, ((measured + self.sites[limb]) / FREE_WEIGHT).min(1.0));
                 self.rests[limb] = Rest { rotation, fraction };
             }

@@ -242,7 +242,7 @@ impl BodyTracker {
             uncertain: suspect || assessor.is_uncertain(&model.extremities),
             anywhere: interrupted,
             // Beside other persons, what the body does not explain may be theirs.
-            unlike: ownership.others == 0 && hypotheses.unlike(),
+            large_excess: ownership.others == 0 && hypotheses.has_large_excess(),
         };
         // A lost body is searched for with everybody's detections, see `crate::People`.
         if assessor.status == Status::Lost {

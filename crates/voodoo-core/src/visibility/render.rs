@@ -170,8 +170,8 @@ impl LimbRaycaster {
             let sign = |bit: usize| if index & bit == 0 { 1.0 } else { -1.0 };
             sensor_from_limb * Vec3::new(sign(1) * end.a, sign(2) * end.b, end.z)
         });
-        let seen = places.iter().all(|place| place.z > PRECISION);
-        let corners = seen.then(|| places.map(|place| [place.x / place.z, place.y / place.z]));
+        let in_front = places.iter().all(|place| place.z > PRECISION);
+        let corners = in_front.then(|| places.map(|place| [place.x / place.z, place.y / place.z]));
         if let Some(corners) = &corners {
             for axis in 0..2 {
                 let values = || corners.iter().map(|corner| corner[axis]);

@@ -361,12 +361,12 @@ impl SkinCue {
     /// [`TrackError::Measurement`] when the image is not of the camera's size.
     pub fn learn(&mut self, image: &[[u8; 3]], eye: &Eye, joints: &[Vec3], sites: &[Vec3]) -> Result<(), TrackError> {
         eye.check("image", "a color for every pixel of the camera", image.len())?;
-        let (mut faces, mut shown) = (Vec::new(), Vec::new());
+        let (mut faces, mut discs) = (Vec::new(), Vec::new());
         let inside = sites.iter().map(|place| eye.in_sensor(*place)).enumerate();
         for (site, inside) in inside.filter(|(_, inside)| inside.z > NEAREST) {
             let head = self.side(site).is_none();
             let (pixel, radius) = (eye.pixel(inside), if head { FACE } else { PALM } * eye.focal() / inside.z);
-            shown.push((pixel, TAUGHT.1 * radius));
+            discs.push((pixel, TAUGHT.1 * radius));
             if head && (self.colors.learned == 0 || self.assigned.iter().any(|(found, _)| *found == site)) {
                 faces.push((pixel, TAUGHT.0 * radius));
             }
@@ -378,7 +378,7 @@ impl SkinCue {
         let window = window(eye, joints, LEARNED);
         let color = |(row, column): (usize, usize)| image[row * eye.camera.width() + column];
         let face = pixels(&window).filter(|pixel| within(&faces, *pixel)).map(color);
-        self.colors.learn(face, pixels(&window).filter(|pixel| !within(&shown, *pixel)).map(color));
+        self.colors.learn(face, pixels(&window).filter(|pixel| !within(&discs, *pixel)).map(color));
         Ok(())
     }
 }

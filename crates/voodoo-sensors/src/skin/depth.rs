@@ -21,16 +21,16 @@ impl DepthBeside<'_> {
     /// Depth along the color camera's axis, meters, of what is seen on its ray `(x/z, y/z)`; `None` if it is not known. `z` is the
     /// depth that is expected.
     pub(super) fn at(&self, color: &Eye, ray: [f64; 2], z: f64) -> Option<f64> {
-        let first = self.look(color, ray, z)?;
+        let first = self.depth_at(color, ray, z)?;
         if (first - z).abs() < SAME {
             return Some(first);
         }
         // The two cameras see what is farther or nearer at another offset.
-        self.look(color, ray, first).filter(|second| (second - first).abs() < SAME)
+        self.depth_at(color, ray, first).filter(|second| (second - first).abs() < SAME)
     }
 
     /// Depth of what the depth camera sees where this ray has the depth `z`.
-    fn look(&self, color: &Eye, ray: [f64; 2], z: f64) -> Option<f64> {
+    fn depth_at(&self, color: &Eye, ray: [f64; 2], z: f64) -> Option<f64> {
         let camera = self.eye.camera;
         let index = camera.index_of(self.eye.in_sensor(color.place(ray, z)))?;
         let depth = f64::from(self.image.get(index)) * self.meters_per_unit;

@@ -9,7 +9,7 @@ from voodoo.export.foxglove import Channels, library
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
 from voodoo.live.sinks import parts_of
-from voodoo.live.sinks.people import shown
+from voodoo.live.sinks.people import posed_people
 
 PORT = 8766
 """Foxglove's own default is that of `ws://`."""
@@ -48,9 +48,9 @@ class FoxgloveSink(Output):
 
     def publish(self, step: Step) -> None:
         """See Output."""
-        if not self._channels.are_wanted:
+        if not self._channels.are_subscribed:
             return
-        people = shown(step, self._root())
+        people = posed_people(step, self._root())
         about = [] if people.layout is None else [people.layout.shapes] * len(people.there)
         self._channels.log(step.stamp, people.ids, about, [people.rows_there], people.frame)
 

@@ -17,7 +17,7 @@ from voodoo.export.upright import SUFFIX, Turn, by_axes
 from voodoo.live.follow import Step
 
 
-class Shown(NamedTuple):
+class PosedPeople(NamedTuple):
     """Persons P of a step who have a pose.
 
     Attributes:
@@ -44,21 +44,29 @@ class Shown(NamedTuple):
 
 
 @lru_cache(maxsize=2)
-def shown(step: Step, root_frame: str) -> Shown:
+def posed_people(step: Step, root_frame: str) -> PosedPeople:
     """The persons of a step who have a pose."""
     turn = by_axes(root_frame) if step.turn is None else step.turn
     frame = f"{root_frame}{SUFFIX}" if turn.words else root_frame
     statuses = {number: one.status for number, one in step.estimates.items()}
     found = {number: step.estimates[number] for number, status in statuses.items() if status != "searching"}
     if not found:
-        return Shown(frame, turn, found, None, np.empty((0, 0)))
+        return PosedPeople(frame, turn, found, None, np.empty((0, 0)))
     number, first = next(iter(found.items()))
     layout = layout_of(first.joint_names, step.bodies[number].limb_tree, step.bodies[number].limb_joints)
     cores = [step.bodies[number].core for number in found]
     rows = layout.core.rows(list(found.values()), cores, turn.pose if turn.words else None)
     known = np.isfinite(rows[:, sum(layout.widths[:5])]).tolist()  # the first number of the covariance
-    seen = [statuses[number] != "lost" for number in found]
-    there, sure = tuple(compress(found, seen)), tuple(compress(known, seen))
-    return Shown(
-        frame, turn, found, layout, rows, there, tuple(map(person_id, there)), rows if all(seen) else rows[seen], sure
+    tracked = [statuses[number] != "lost" for number in found]
+    there, sure = tuple(compress(found, tracked)), tuple(compress(known, tracked))
+    return PosedPeople(
+        frame,
+        turn,
+        found,
+        layout,
+        rows,
+        there,
+        tuple(map(person_id, there)),
+        rows if all(tracked) else rows[tracked],
+        sure,
     )

@@ -19,7 +19,7 @@ from voodoo.export.template import STAMP_NS, template
 from voodoo.live.follow import Step
 from voodoo.live.ros2.dds import Node, Offer, Publication
 from voodoo.live.session import Output
-from voodoo.live.sinks.people import shown
+from voodoo.live.sinks.people import posed_people
 from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.model.body import Body
 from voodoo.pipeline.front_end import nobody
@@ -28,7 +28,7 @@ ADDRESS = "ros2://"
 RESET, FOLLOW = "/voodoo/reset", "/voodoo/follow"
 _PLACE = "geometry_msgs/msg/PointStamped"
 _ON_DEMAND = {"markers": "visualization_msgs/msg/MarkerArray", "skeleton2d": ros2.SKELETON}
-_LOOK_S = 0.5
+_CHECK_S = 0.5
 """How often sizes, subscribers of markers, and what is asked for are looked at."""
 _OTHER_SIZE = 0.01
 """A body whose limbs' lengths changed by this fraction together is described again."""
@@ -74,8 +74,8 @@ class Ros2Sink(Output):
         self._topics: dict[str, Publication] = {}
         self._displayed: dict[int, Body] = {}
         self._described: dict[int, float] = {}
-        self._wanted: dict[int, dict[str, int]] = {}
-        self._looked = -np.inf
+        self._requested: dict[int, dict[str, int]] = {}
+        self._checked = -np.inf
         self._template_of = lru_cache(8)(self._make_template)
         self._resets = self._node.subscribe(RESET, Offer("std_msgs/msg/Empty", reliable=False, latched=False))
         self._follows = self._node.subscribe(FOLLOW, Offer(_PLACE, reliable=False, latched=False))
@@ -89,7 +89,7 @@ class Ros2Sink(Output):
     def publish(self, step: Step) -> None:
         """See Output."""
         root = self._root()
-        people = shown(step, root)
+        people = posed_people(step, root)
         frame, numbers = people.frame, [people.rows_there]
         observed = {number: step.bodies[number] for number in people.there}
         if observed and frame != root:
@@ -100,19 +100,19 @@ class Ros2Sink(Output):
         for publication, message in zip(publications, messages, strict=True):
             publication.write(message)
         displayed = self._displayed | observed  # markers of persons who left are deleted once
-        if displayed.keys() != self._wanted.keys() or abs(step.stamp - self._looked) > _LOOK_S:
-            self._looked = step.stamp
+        if displayed.keys() != self._requested.keys() or abs(step.stamp - self._checked) > _CHECK_S:
+            self._checked = step.stamp
             self._obey()
             self._describe(observed)
-            self._wanted = {number: self._subscribers(number) for number in displayed}
+            self._requested = {number: self._subscribers(number) for number in displayed}
         image = next((item for item in step.frame.measurements if isinstance(item, (DepthImage, ColorImage))), None)
         for number in displayed:
-            if self._wanted[number]["markers"]:
+            if self._requested[number]["markers"]:
                 estimate = step.estimates[number] if number in observed else nobody(step.stamp)
                 how: Any = {"root_frame": root, "person": ros2.person_id(number), "turn": step.turn}
                 topic = _topic(number, "markers")
                 self._write({topic: ros2.instant(estimate, displayed[number], **how)[topic]})
-            if self._wanted[number]["skeleton2d"] and number in observed and image is not None:
+            if self._requested[number]["skeleton2d"] and number in observed and image is not None:
                 self._write({_topic(number, "skeleton2d"): ros2.keypoints_message(step.estimates[number], image)})
         self._displayed = observed
 

@@ -21,7 +21,7 @@ from voodoo.export.template import template
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
 from voodoo.live.sinks import parts_of
-from voodoo.live.sinks.people import shown
+from voodoo.live.sinks.people import posed_people
 from voodoo.measurements import FloatArray
 
 PORT = 39539
@@ -68,7 +68,7 @@ class VmcSink(Output):
             OSError: nobody receives.
         """
         self._start = step.stamp if self._start is None else self._start
-        people, numbers = shown(step, self._root()), [np.array([step.stamp - self._start])]
+        people, numbers = posed_people(step, self._root()), [np.array([step.stamp - self._start])]
         if people.there:
             numbers.append(people.rows_there[people.there.index(min(people.there))])
         for datagram in self._template_of(people.layout if people.there else None).filled(numbers, b""):

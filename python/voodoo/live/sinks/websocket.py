@@ -22,7 +22,7 @@ from voodoo.export.layout import Layout
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
 from voodoo.live.sinks import parts_of
-from voodoo.live.sinks.people import shown
+from voodoo.live.sinks.people import posed_people
 
 FORMAT, VERSION = "voodoo.people", 1
 """The version is increased if earlier readers would misread a message, not for additional keys."""
@@ -156,7 +156,7 @@ class WebSocketSink(Output):
 
 def message_of(step: Step, root_frame: str) -> bytes:
     """The message of a step as JSON, see docs/how-to/stream.md."""
-    people = shown(step, root_frame)
+    people = posed_people(step, root_frame)
     numbers = [] if people.layout is None else [people.rows[:, people.layout.text]]
     text = _format(people.frame, tuple(people.estimates), people.layout)
     return _core.people_text(text, numbers, step.stamp, list(people.estimates.values()))

@@ -57,7 +57,7 @@ class StartFrame:
     settings: FrontEndSettings
 
 
-def seen_sites(item: KeypointImage, rows: FloatArray, frame: StartFrame) -> list[SitePixel]:
+def visible_sites(item: KeypointImage, rows: FloatArray, frame: StartFrame) -> list[SitePixel]:
     """The sites of the body at the keypoints (K, 3) of one person; [] if they are too few for a first pose."""
     sites, _ = site_pixels(rows, layout=item.layout, min_confidence=frame.settings.min_confidence)
     sites = [site for site in sites if site.site in frame.body.site_names]

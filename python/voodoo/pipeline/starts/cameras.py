@@ -98,7 +98,7 @@ def _stands(places: dict[str, TriangulatedSite], frame: StartFrame) -> bool:
 
 def _person(item: KeypointImage, rows: FloatArray, frame: StartFrame) -> _Person:
     """One person of one image; {} with too few keypoints."""
-    if not (sites := base.seen_sites(item, rows, frame)):
+    if not (sites := base.visible_sites(item, rows, frame)):
         return {}
     origin, directions = world_rays(item.camera, item.root_from_sensor, [site.pixel for site in sites])
     noise, focal = frame.settings.keypoint_noise, float(np.sqrt(item.camera.fx * item.camera.fy))

@@ -51,7 +51,7 @@ def _people(item: KeypointImage, depths: Sequence[DepthImage], frame: StartFrame
     depth = min(near, key=lambda each: (abs(each.stamp - item.stamp), each.camera != item.camera))
     surface = _points_in_view(depth, item)
     for rows in item.people:
-        if sites := base.seen_sites(item, rows, frame):
+        if sites := base.visible_sites(item, rows, frame):
             person = _placed(sites, item, surface, frame, coarse=item.camera.fx / depth.camera.fx)
             kept = base.in_proportion(base.without_impossible({name: place for name, (place, _) in person.items()}))
             if len(kept) >= base.LEAST_SITES and base.fixes_pose(kept, frame.body):

@@ -64,6 +64,6 @@ class RegionSilhouettes:
         frame = Frame(pictures[0].stamp)
         for item in pictures:
             lens = _lens_of(item.camera)
-            seen = np.ascontiguousarray(lens.apply(item.image))
-            frame.add_color(seen, camera=lens.camera, world_from_sensor=item.root_from_sensor, source=item.sensor)
+            rectified = np.ascontiguousarray(lens.apply(item.image))
+            frame.add_color(rectified, camera=lens.camera, world_from_sensor=item.root_from_sensor, source=item.sensor)
         return frame

@@ -163,8 +163,8 @@ impl Assessor {
         let sources = &estimate.sources;
         let missed = sources.iter().any(|source| source.residual > MISSED)
             || !sources.is_empty() && sources.iter().all(|source| source.inliers == 0);
-        let doubtful = missed || measured_fraction(statuses) < 1.0 - SOME;
-        estimate.status = if status == Status::Tracking && doubtful { Status::Degraded } else { status };
+        let low_confidence = missed || measured_fraction(statuses) < 1.0 - SOME;
+        estimate.status = if status == Status::Tracking && low_confidence { Status::Degraded } else { status };
     }
 
     /// Updates the filter of every limb with this frame. Returns the roundness of the observed surface, see [`measure_support`].
