@@ -83,6 +83,9 @@ impl Backgrounds {
 
     /// Becomes the scene as one person sees it: with what other persons explain hidden.
     pub(super) fn mask(&mut self, frame: &Frame, ownership: OwnershipMask) {
+        if frame.images.is_empty() {
+            return; // The memory is kept for the next frame with images.
+        }
         self.images.resize_with(frame.images.len(), Background::default);
         for (number, (image, own)) in frame.images.iter().zip(&mut self.images).enumerate() {
             (own.world_from_sensor, own.width) = (image.world_from_sensor, image.camera.width());
