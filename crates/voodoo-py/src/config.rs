@@ -1,6 +1,6 @@
 //! The table of configuration entries, and a core configuration from plain values.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -26,7 +26,7 @@ pub(crate) fn config_fields(py: Python<'_>) -> PyResult<Vec<FieldRow<'_>>> {
 /// A configuration from the values of a dictionary.
 pub(crate) fn config(values: &Bound<'_, PyDict>) -> PyResult<Config> {
     let refused = |error: String| ConfigError::new_err(error);
-    let values: HashMap<String, Value> = depythonize(values).map_err(|error| refused(error.to_string()))?;
+    let values: BTreeMap<String, Value> = depythonize(values).map_err(|error| refused(error.to_string()))?;
     let mut config = Config::default();
     for (key, value) in values {
         config.set(&key, value).map_err(|error| refused(error.to_string()))?;
