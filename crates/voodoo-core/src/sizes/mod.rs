@@ -10,19 +10,19 @@ use crate::config::Config;
 use crate::detect::JointMap;
 use crate::fit::{CONTOUR_FROM, Fit, Setting};
 use crate::math::{Pose, Vec3};
-use crate::solver::{Gate, LENGTH_INFORMATION};
+use crate::solver::Gate;
 use color_girth::ColorGirths;
 use girth::{
-    ASIDE_SIGMA, FOUND_SHARE, GIRTH_STEPS, Girth, GirthPrior, TIP_FACTORS, first_system, follow_girth, side_system,
-    start_girth,
+    ALIKE, ASIDE_SIGMA, FOUND_SHARE, GIRTH_STEPS, Girth, GirthPrior, TIP_FACTORS, first_system, follow_girth,
+    side_system, start_girth,
 };
 pub(crate) use reported::LengthEstimate;
 use reported::ReportedLengths;
 
 /// Points farther than this from the given pose are not used for the sizes, meters.
 const START_GATE: Gate = Gate { box_margin: 0.10, distance: 0.10 };
-/// Greatest relative change of a limb's length in one frame.
-const LENGTH_STEP: f64 = 0.02;
+/// Relative standard deviation of a limb's length that no detection reported.
+pub(crate) const LENGTH_SIGMA: f64 = 0.07;
 /// Limits of the factor by which all frames together change a limb's length.
 const LENGTH_FACTORS: [f64; 2] = [0.5, 2.0];
 
@@ -168,17 +168,17 @@ impl Sizes {
         change.clear();
         pull.clear();
         for (pair, stretched) in pairs.iter().zip(stretched.iter()) {
-            let (factor, information) = reported.factor(map, pair[0]).unwrap_or((1.0, LENGTH_INFORMATION[1]));
+            let (factor, sigma) = reported.factor(map, pair[0]).unwrap_or((1.0, LENGTH_SIGMA));
             change.push(factor - stretched);
-            pull.push(information);
+            // Errors of points are correlated over frames: the prior counts as many times as one frame's information.
+            pull.push(ALIKE / (sigma * sigma));
         }
         if !fit.lengths(setting.with_model(model), predicted, poses, pairs, pull, change) {
             return;
         }
         let [shortest, longest] = LENGTH_FACTORS;
         for ((pair, total), change) in pairs.iter().zip(stretched).zip(change.iter()) {
-            let factor = ((*total + change.clamp(-LENGTH_STEP, LENGTH_STEP)) / *total)
-                .clamp(shortest / *total, longest / *total);
+            let factor = (*total + change).clamp(shortest, longest) / *total;
             *total *= factor;
             pair.iter().for_each(|limb| model.body.change_length(*limb, factor));
         }

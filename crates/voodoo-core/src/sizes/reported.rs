@@ -1,7 +1,6 @@
 //! Lengths of limbs and stature that a detector reports, averaged over detections. They are less precise for a sitting person
 //! than for a standing one.
 
-use super::girth::ALIKE;
 use crate::detect::{Detected, JointMap};
 
 /// Relative standard deviation of the stature below which the sizes count as known. The detector reports 4 to 6 % for persons who
@@ -50,12 +49,11 @@ impl ReportedLengths {
         stature.is_some_and(|stature| stature.information > 0.0 && stature.information < 1.0 / (KNOWN * KNOWN))
     }
 
-    /// Returns the ratio of a limb's mean reported length to the length from which the sizes were set, and the information of
-    /// that ratio, multiplied by `ALIKE` for comparison with that of one frame, whose points have correlated errors. `None` if
-    /// the length was not reported.
+    /// Returns the ratio of a limb's mean reported length to the length from which the sizes were set, and the standard
+    /// deviation of that ratio. `None` if the length was not reported.
     pub(super) fn factor(&self, map: &JointMap, limb: usize) -> Option<(f64, f64)> {
         let known = self.0.get(map.length_of_limb(limb)?)?;
-        (known.information > 0.0).then(|| ((known.mean - known.set).exp(), ALIKE * known.information))
+        (known.information > 0.0).then(|| ((known.mean - known.set).exp(), known.information.powf(-0.5)))
     }
 }
 
@@ -65,7 +63,7 @@ mod tests {
     use crate::body::{Body, HumanModel};
     use crate::detect::Detection;
 
-    /// Factor and information of the thigh after detections of one person, and whether the sizes are uncertain.
+    /// Factor of the thigh and its standard deviation after detections of one person, and whether the sizes are uncertain.
     fn reported(detections: &[[f64; 2]]) -> (f64, f64, bool) {
         let body = Body::human(1.75, HumanModel::Full).unwrap_or_else(|error| unreachable!("{error}"));
         let names = ["stature", "thigh", "trunk"].map(String::from);
@@ -77,24 +75,24 @@ mod tests {
             lengths.update(Detected { detection: &detection, map: &map });
         }
         let factor_of = |limb| body.limb_index(limb).ok().and_then(|limb| lengths.factor(&map, limb));
-        let (factor, information) = factor_of("l_thigh").unwrap_or((f64::NAN, f64::NAN));
+        let (factor, sigma) = factor_of("l_thigh").unwrap_or((f64::NAN, f64::NAN));
         assert_eq!(factor_of("pelvis"), factor_of("thorax"));
         assert_eq!(factor_of("l_calf"), None, "no shank is reported");
-        (factor, information, lengths.is_uncertain(&map))
+        (factor, sigma, lengths.is_uncertain(&map))
     }
 
     #[test]
     fn who_stands_up_is_as_tall_as_the_surer_detections_report_and_later_ones_that_follow_are_worth_no_more() {
         let (sitting, standing) = ([1.0, 0.05], [0.9, 0.02]);
-        let (factor, information, uncertain) = reported(&[sitting; 9]);
-        assert!((factor - 1.0).abs() < 1e-12 && (information - ALIKE / 0.0025).abs() < 1e-6 && uncertain);
+        let (factor, sigma, uncertain) = reported(&[sitting; 9]);
+        assert!((factor - 1.0).abs() < 1e-12 && (sigma - 0.05).abs() < 1e-9 && uncertain);
         let mut detections = vec![sitting; 9];
         detections.extend([standing; 2]);
-        let (factor, information, uncertain) = reported(&detections);
-        assert!((0.9..0.91).contains(&factor) && (information - ALIKE / 0.0004).abs() < 1e-6 && !uncertain, "{factor}");
+        let (factor, sigma, uncertain) = reported(&detections);
+        assert!((0.9..0.91).contains(&factor) && (sigma - 0.02).abs() < 1e-9 && !uncertain, "{factor}");
         detections.push(sitting);
         let (again, after, uncertain) = reported(&detections);
-        assert!(again - factor < 0.02 && after == information && !uncertain, "{again} after {factor}");
+        assert!(again - factor < 0.02 && after == sigma && !uncertain, "{again} after {factor}");
     }
 
     #[test]

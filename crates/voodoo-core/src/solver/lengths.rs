@@ -2,9 +2,12 @@
 
 use nalgebra::Vector6;
 
-use super::{ChainSolver, LENGTH_INFORMATION};
+use super::ChainSolver;
 use crate::body::{Body, Pair};
 use crate::math::{Pose, Vec3, dot, factor, half_substitute, reset, solve_in_place, vectorized};
+
+/// Information that damps the relative change of a length in one frame.
+const LENGTH_DAMPING: f64 = 1e4;
 
 impl ChainSolver {
     /// Writes the relative change of length of each pair to `change`: the Gauss-Newton step of the lengths after elimination of
@@ -25,7 +28,7 @@ impl ChainSolver {
         let count = pairs.len();
         self.eliminate(count);
         for row in 0..count {
-            self.reduced[row * count + row] += LENGTH_INFORMATION[0] + pull[row];
+            self.reduced[row * count + row] += LENGTH_DAMPING + pull[row];
             change[row] = pull[row] * change[row] - self.gradient[row];
         }
         solve_in_place(&mut self.reduced, change, count)

@@ -28,9 +28,6 @@ const HIDDEN_MOTION: f64 = 0.1;
 const TO_REST: f64 = 0.1;
 /// The same for a leg, which swings while its person walks: half of the way in three quarters of a second.
 const LEG_TO_REST: f64 = 0.03;
-/// Information that damps the relative change of a length in one frame, and information that pulls it towards the configured
-/// length.
-pub(crate) const LENGTH_INFORMATION: [f64; 2] = [1e4, 5e2];
 /// Minimum scale of the kernel of sites, meters: sites were gated before, and a lost limb has a large residual.
 pub(crate) const SITE_SCALE: f64 = 0.15;
 

@@ -17,8 +17,9 @@ use crate::body::kinematics::{freedoms, joint_axes};
 use crate::body::{Model, Pair};
 use crate::config::Config;
 use crate::math::{Pose, Vec3};
+use crate::sizes::LENGTH_SIGMA;
 use crate::sizes::girth::ALIKE;
-use crate::solver::{ChainSolver, LENGTH_INFORMATION, SITE_SCALE};
+use crate::solver::{ChainSolver, SITE_SCALE};
 use crate::terms::{Measurements, Term};
 
 /// Maximum number of surface points per meter of limb with independent errors.
@@ -101,7 +102,7 @@ impl Uncertainty {
         for (index, site) in body.sites().iter().enumerate() {
             covariances.set_site(index, site.limb, found.poses[site.limb].rotation * site.position);
         }
-        known.resize(found.pairs.len(), LENGTH_INFORMATION[1]);
+        known.resize(found.pairs.len(), 1.0 / (LENGTH_SIGMA * LENGTH_SIGMA));
         let lengths = chain.length_information(body, found.poses, found.pairs);
         for ((pair, known), information) in found.pairs.iter().zip(known).zip(lengths) {
             // Errors of successive frames are correlated.
