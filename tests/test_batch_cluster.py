@@ -146,7 +146,7 @@ def test_ctrl_c_keeps_what_is_done(python, recordings, tmp_path):
         time.sleep(0.1)
     running.send_signal(signal.SIGINT)
     _, message = running.communicate(timeout=60)
-    assert running.returncode == 130 and "interrupted" in message
+    assert running.returncode == 130 and "interrupted" in message, message
     kept = [row for row in rows_of(out).values() if row["status"] == "done"]
     assert 2 <= len(kept) < RECORDINGS
 
