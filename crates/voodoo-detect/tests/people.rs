@@ -97,6 +97,21 @@ fn two_who_cross_keep_their_numbers_and_the_hidden_one_is_not_dragged_along() {
 }
 
 #[test]
+fn somebody_new_who_is_where_a_person_is_tracked_is_that_person() {
+    let (body, place) = (body(1.75), Vec3::new(2.6, 0.0, 0.0));
+    let mut people = People::new(body.clone(), Config::default(), PeopleOptions::default()).unwrap();
+    people.step(&Frame::empty(0.0), &[]).unwrap();
+    for aside in [0.15, 0.0] {
+        let poses = at(&body, place + aside * Vec3::Y);
+        let sites: Vec<_> = (0..body.sites().len()).map(|site| (site, body.site_position(&poses, site))).collect();
+        people.add(&sites, true).unwrap();
+    }
+    let found = feed(&mut people, &shoot(&[(&body, place)], &mut scene::Noise(5)), 1);
+    let [(1, _, root)] = found[..] else { panic!("{found:?}") };
+    assert!(off(root, place) < 0.04, "{root:?}");
+}
+
+#[test]
 fn bits_are_the_same_on_any_number_of_threads() {
     let (images, _) = crossing();
     let run = |threads| {

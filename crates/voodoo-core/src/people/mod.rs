@@ -253,7 +253,7 @@ impl People {
     }
 
     /// Prunes tracks: duplicates (the one that explains fewer pixels, or the newer), and tracks outside the region or not
-    /// requested.
+    /// requested. Somebody new who is a duplicate is the other person, where the new track is if that explains more.
     fn prune_tracks(&mut self) {
         for newer in 0..self.persons.len() {
             let place = self.persons[newer].place;
@@ -261,6 +261,11 @@ impl People {
                 let [a, b] = [older, newer].map(|number| &self.persons[number]);
                 if a.is_tracked() && b.is_tracked() && a.place.distance(place) < ONE_BODY {
                     let more = self.assignment.count(newer) > self.assignment.count(older);
+                    if more && !a.followed && b.is_new() {
+                        let (before, rest) = self.persons.split_at_mut(newer);
+                        before[older].take_place_of(&mut rest[0]);
+                        continue;
+                    }
                     let fewer = if more && !a.followed { older } else { newer };
                     self.persons[fewer].present = false;
                 }

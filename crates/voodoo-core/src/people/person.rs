@@ -8,7 +8,7 @@ use crate::error::TrackError;
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::Frame;
 use crate::observation::ownership::OwnershipMask;
-use crate::relocalize::distance_cost;
+use crate::relocalize::{NEW_TRACK_AGE, distance_cost};
 use crate::sizes::LengthEstimate;
 use crate::tracker::BodyTracker;
 use crate::tracker::estimate::Status;
@@ -87,6 +87,18 @@ impl Person {
     /// Whether the person is present and not lost.
     pub(super) fn is_tracked(&self) -> bool {
         self.present && self.tracker.is_there()
+    }
+
+    /// Whether the person was seen first less than a second ago.
+    pub(super) fn is_new(&self) -> bool {
+        self.last_tracked - self.created < NEW_TRACK_AGE
+    }
+
+    /// Becomes present where a duplicate is, who becomes absent.
+    pub(super) fn take_place_of(&mut self, duplicate: &mut Self) {
+        std::mem::swap(&mut self.tracker, &mut duplicate.tracker);
+        self.place = duplicate.place;
+        duplicate.present = false;
     }
 
     /// Returns the cost of the person's being at a position, nats.

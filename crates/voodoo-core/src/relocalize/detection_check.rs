@@ -5,7 +5,7 @@ use crate::detect::{Detected, Detection};
 use crate::math::{Pose, Vec3};
 
 /// Time for which a track is new, seconds.
-pub(super) const NEW_TRACK_AGE: f64 = 1.0;
+pub(crate) const NEW_TRACK_AGE: f64 = 1.0;
 /// Interval between detections of a new, lost or uncertain track, seconds: a detection takes as long as a frame or two. Several
 /// persons share those of uncertain tracks.
 const EVERY: f64 = 0.12;

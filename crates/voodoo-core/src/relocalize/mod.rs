@@ -21,7 +21,9 @@ use crate::observation::ownership::OwnershipMask;
 use crate::observation::segments::Segments;
 use crate::tracker::estimate::Status;
 use detection_check::{DetectionCheck, ELSEWHERE, SIGMAS};
-pub(crate) use detection_check::{DetectionVerdict, ENOUGH_ODDS, Reasons, distance_cost, trunk_is_elsewhere};
+pub(crate) use detection_check::{
+    DetectionVerdict, ENOUGH_ODDS, NEW_TRACK_AGE, Reasons, distance_cost, trunk_is_elsewhere,
+};
 use trials::{Trials, try_at};
 
 /// Number of consecutive frames after which a lost body counts as lost.
