@@ -109,7 +109,8 @@ impl Person {
     /// Returns the cost of the detected stature for this person, nats: all sizes scale with the stature.
     pub(super) fn stature_cost(&self, detected: Detected) -> f64 {
         let Some([stature, sigma]) = detected.stature().filter(|_| self.stature.information > 0.0) else { return 0.0 };
-        0.5 * (stature.ln() - self.stature.mean).powi(2) / (1.0 / self.stature.information + sigma * sigma)
+        // The detector is trained for errors of a Laplace distribution.
+        (stature.ln() - self.stature.mean).abs() * (2.0 / (1.0 / self.stature.information + sigma * sigma)).sqrt()
     }
 
     /// Updates the person after the tracker's step. A person who has been lost for too long becomes absent.
