@@ -22,7 +22,7 @@ use reported::ReportedLengths;
 /// Points farther than this from the given pose are not used for the sizes, meters.
 const START_GATE: Gate = Gate { box_margin: 0.10, distance: 0.10 };
 /// Relative standard deviation of a limb's length that no detection reported.
-pub(crate) const LENGTH_SIGMA: f64 = 0.07;
+pub(crate) const LENGTH_SIGMA: f64 = 0.1;
 /// Limits of the factor by which all frames together change a limb's length.
 const LENGTH_FACTORS: [f64; 2] = [0.5, 2.0];
 
