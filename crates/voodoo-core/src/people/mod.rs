@@ -33,7 +33,7 @@ use std::borrow::Cow;
 use tentative_tracks::{SAME_PERSON, TentativeTracks};
 
 /// Two tracks whose roots are nearer than this are duplicates, meters.
-const ONE_BODY: f64 = 0.25;
+const ONE_BODY: f64 = 0.2;
 
 /// Tracks several persons through a sequence of frames.
 ///
@@ -190,8 +190,8 @@ impl People {
         for number in (0..self.persons.len()).filter(|number| !self.persons[*number].is_tracked()) {
             self.assignment.release(number..=number);
         }
-        self.find_new(frame, &of_detection);
         self.prune_tracks();
+        self.find_new(frame, &of_detection);
         // Persons who have been absent for too long are deleted.
         let forget_after = self.options.forget_after;
         self.persons
