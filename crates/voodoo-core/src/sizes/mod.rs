@@ -170,7 +170,7 @@ impl Sizes {
         for (pair, stretched) in pairs.iter().zip(stretched.iter()) {
             let (factor, sigma) = reported.factor(map, pair[0]).unwrap_or((1.0, LENGTH_SIGMA));
             change.push(factor - stretched);
-            // Errors of points are correlated over frames: the prior counts as many times as one frame's information.
+            // Errors of points are correlated over frames, so a frame has a fraction of its information: the prior has more instead.
             pull.push(ALIKE / (sigma * sigma));
         }
         if !fit.lengths(setting.with_model(model), predicted, poses, pairs, pull, change) {
