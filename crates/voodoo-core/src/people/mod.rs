@@ -260,13 +260,13 @@ impl People {
             for older in 0..newer {
                 let [a, b] = [older, newer].map(|number| &self.persons[number]);
                 if a.is_tracked() && b.is_tracked() && a.place.distance(place) < ONE_BODY {
-                    let more = self.assignment.count(newer) > self.assignment.count(older);
-                    if more && !a.followed && b.is_new() {
+                    let more = !a.followed && self.assignment.count(newer) > self.assignment.count(older);
+                    let new = b.is_new();
+                    if more && new {
                         let (before, rest) = self.persons.split_at_mut(newer);
-                        before[older].take_place_of(&mut rest[0]);
-                        continue;
+                        before[older].exchange_track(&mut rest[0]);
                     }
-                    let fewer = if more && !a.followed { older } else { newer };
+                    let fewer = if more && !new { older } else { newer };
                     self.persons[fewer].present = false;
                 }
             }

@@ -94,11 +94,10 @@ impl Person {
         self.last_tracked - self.created < NEW_TRACK_AGE
     }
 
-    /// Becomes present where a duplicate is, who becomes absent.
-    pub(super) fn take_place_of(&mut self, duplicate: &mut Self) {
-        std::mem::swap(&mut self.tracker, &mut duplicate.tracker);
-        self.place = duplicate.place;
-        duplicate.present = false;
+    /// Exchanges the track with that of another person: both keep their numbers, clothes and statures.
+    pub(super) fn exchange_track(&mut self, other: &mut Self) {
+        std::mem::swap(&mut self.tracker, &mut other.tracker);
+        std::mem::swap(&mut self.place, &mut other.place);
     }
 
     /// Returns the cost of the person's being at a position, nats.
