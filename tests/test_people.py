@@ -68,7 +68,7 @@ def test_a_person_enters_and_leaves(someone):
 def test_who_enters_while_somebody_is_hidden_gets_an_id_of_their_own():
     """The first of four is hidden when the last one, in other clothes, enters 1 m aside."""
     recording = four(3)
-    *_, last = islice(track(recording, voodoo.People()), 47)
+    *_, last = islice(track(recording, voodoo.People()), 50)
     truth = recording.people
     row = np.abs(truth.stamps - last.estimate.stamp).argmin()
     assert (truth.in_view[row] > 0.4).all()

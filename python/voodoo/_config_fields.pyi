@@ -53,7 +53,7 @@ class ConfigFields(BaseModel, frozen=True, extra="forbid"):
     """Standard deviation of a surface point of weight one, for the whole-body solvers. (unit: m; range: 0.0001
     to 1)
     """
-    tangential_weight: float = 0.07
+    tangential_weight: float = 0.035
     """Fraction of the information of a surface point that is tangential, for the whole-body solvers: 0 is point-
     to-plane, 1 is point-to-point; a small value prevents limbs from sliding along their axes. (range: 0 to 1)
     """
@@ -67,7 +67,7 @@ class ConfigFields(BaseModel, frozen=True, extra="forbid"):
     """Scale of the robust kernel in the first step of a frame; it decreases with every step. (unit: m; range:
     0.001 to 10)
     """
-    kernel_end: float = 0.03
+    kernel_end: float = 0.015
     """Final scale of the robust kernel, for the whole-body solvers. (unit: m; range: 0.001 to 10)"""
     depth_contour_sigma: float = 0.01
     """Standard deviation of an edge of the depth contour, for the whole-body solvers. (unit: m; range: 0.0001 to

@@ -172,7 +172,7 @@ config! {
     point_sigma: f64 = 0.03, "m", 0.0001 ..= 1.0;
     /// Fraction of the information of a surface point that is tangential, for the whole-body solvers: 0 is point-to-plane,
     /// 1 is point-to-point; a small value prevents limbs from sliding along their axes.
-    tangential_weight: f64 = 0.07, "", 0.0 ..= 1.0;
+    tangential_weight: f64 = 0.035, "", 0.0 ..= 1.0;
     /// Maximum distance of a matched point in the first step of a frame, for the whole-body solvers; it decreases.
     gate_start: f64 = 0.30, "m", 0.001 ..= 10.0;
     /// Final maximum distance of a matched point, for the whole-body solvers.
@@ -180,7 +180,7 @@ config! {
     /// Scale of the robust kernel in the first step of a frame; it decreases with every step.
     kernel_start: f64 = 0.10, "m", 0.001 ..= 10.0;
     /// Final scale of the robust kernel, for the whole-body solvers.
-    kernel_end: f64 = 0.03, "m", 0.001 ..= 10.0;
+    kernel_end: f64 = 0.015, "m", 0.001 ..= 10.0;
     /// Standard deviation of an edge of the depth contour, for the whole-body solvers.
     depth_contour_sigma: f64 = 0.01, "m", 0.0001 ..= 1.0;
     /// Fraction of the last motion that is extrapolated (0: the body is expected to stand still; whole-body solvers).
