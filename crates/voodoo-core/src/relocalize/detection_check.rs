@@ -6,7 +6,7 @@ use crate::math::{Pose, Vec3};
 
 /// Time for which a track is new, seconds.
 pub(crate) const NEW_TRACK_AGE: f64 = 1.0;
-/// Interval between detections of a new, lost or uncertain track, seconds: a detection takes as long as a frame or two. Several
+/// Interval between detections of a new or uncertain track, seconds: a detection takes as long as a frame or two. Several
 /// persons share those of uncertain tracks.
 const EVERY: f64 = 0.12;
 /// A detection is elsewhere when its trunk or legs have at least this mean distance from the tracked ones, meters. Other
@@ -107,13 +107,20 @@ impl DetectionCheck {
         self.since.is_none_or(|since| stamp - since < NEW_TRACK_AGE)
     }
 
+    /// The frame after a loss needs a detection: a body among others may come back at another person.
+    pub(super) fn expire(&mut self) {
+        self.last_detection = None;
+    }
+
     /// Counts a frame and returns whether the detector is due for a person beside so many others.
     pub(super) fn is_due(&mut self, stamp: f64, reasons: Reasons, others: usize) -> bool {
         let Reasons { uncertain, anywhere, large_excess } = reasons;
         let new_track = self.is_new(stamp);
         self.since = self.since.or(Some(stamp));
+        // A person who may be elsewhere does not share detections.
+        let sharing = if self.elsewhere > 0.0 { 0 } else { others };
         let waited = |wait: f64| self.last_detection.is_none_or(|last| stamp - last >= wait);
-        self.counts = new_track && waited(EVERY) || (uncertain || anywhere) && waited(EVERY * (1.0 + others as f64));
+        self.counts = new_track && waited(EVERY) || (uncertain || anywhere) && waited(EVERY * (1.0 + sharing as f64));
         if self.counts {
             self.last_detection = Some(stamp);
         }
@@ -166,6 +173,18 @@ mod tests {
         let counts = [count(0.0, none, 0), count(2.0, uncertain, 0), count(2.0, anywhere, 0), count(2.0, none, 0)];
         assert_eq!(counts, [7, 7, 7, 0]);
         assert_eq!([count(0.0, none, 3), count(2.0, uncertain, 1), count(2.0, uncertain, 3)], [7, 4, 2]);
+    }
+
+    #[test]
+    fn among_others_the_frame_after_a_loss_is_checked_and_soon_again_who_may_be_elsewhere() {
+        let uncertain = Reasons { uncertain: true, ..Reasons::default() };
+        let mut check = DetectionCheck { since: Some(-2.0), ..DetectionCheck::default() };
+        let due = |check: &mut DetectionCheck, stamp| check.is_due(stamp, uncertain, 3);
+        assert!(due(&mut check, 0.0) && !due(&mut check, 0.2));
+        check.expire();
+        assert!(due(&mut check, 0.3) && !due(&mut check, 0.5));
+        check.elsewhere = 0.5 * ENOUGH_ODDS;
+        assert!(!due(&mut check, 0.3 + 0.5 * EVERY) && due(&mut check, 0.5));
     }
 
     #[test]

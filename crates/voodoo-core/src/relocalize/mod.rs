@@ -37,7 +37,7 @@ pub(crate) struct Relocalizer {
     /// The detection of this frame.
     pub(crate) detection: Option<PlacedDetection>,
     /// Number of the image with the detection.
-    image: usize,
+    pub(crate) image: usize,
     /// The floor that the detector found under an auto-initialized body, world frame. It is used where the ground plane is not
     /// given.
     pub(crate) floor: Option<Ground>,
@@ -124,6 +124,7 @@ impl Relocalizer {
     pub(crate) fn observe(&mut self, status: Status, silent: bool, poses: &[Pose]) {
         if status == Status::Lost {
             self.lost += usize::from(!silent);
+            self.check.expire();
         } else if status == Status::Tracking || !self.is_searching() {
             self.lost = 0;
         }
