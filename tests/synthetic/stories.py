@@ -84,14 +84,14 @@ def passing(seed: int) -> MadeUpRecording:
 
 
 def four(seed: int, *, seconds: float = 12.0) -> MadeUpRecording:
-    """Four persons enter one after the other and walk to and fro at four depths."""
+    """Four persons enter one after the other and walk to and fro at four depths for 12 s, of which the first are recorded."""
     chance = np.random.default_rng((seed, 4))
     people = []
     for number, depth in enumerate(chance.permutation((1.9, 2.5, 3.1, 3.7))):
         side = (-1.0, 1.0)[number % 2]
         time = 0.5 + 0.5 * number
         points = [(time, float(depth), side * _outside(depth))]
-        while time < seconds:
+        while time < 12.0:
             side = -side
             time += float(chance.uniform(1.8, 2.6))
             y = side * float(chance.uniform(0.2, 0.3)) * depth

@@ -34,7 +34,7 @@ impl People {
         }
         self.detect_new(frame);
         let mut confirmed = self.tentative.take_confirmed(frame.stamp);
-        confirmed.retain(|track| !self.is_part_of_tracked(frame, track));
+        confirmed.retain(|track| !self.join_tracked(frame, track));
         let sums = self.tentative.updated_at(frame.stamp).map(|track| track.log_odds);
         self.refusal = sums.max_by(f64::total_cmp).map(|log_odds| Refusal::LowConfidence { log_odds });
         if !confirmed.is_empty() {
@@ -42,9 +42,10 @@ impl People {
         }
     }
 
-    /// Whether a tentative track is a part of a person who is tracked beside it: their pixels and its own, taken together, are
-    /// detected as one person who is where that person is.
-    fn is_part_of_tracked(&mut self, frame: &Frame, track: &TentativeTrack) -> bool {
+    /// Joins a tentative track to a person who is tracked beside it, if their pixels and its own, taken together, are detected as
+    /// one person who is where that person is, or who explains the frame better where they were detected: then the person moves
+    /// there. Returns whether it did.
+    fn join_tracked(&mut self, frame: &Frame, track: &TentativeTrack) -> bool {
         let Some(image) = frame.images.get(track.image).filter(|_| !track.detection.pixels.is_empty()) else {
             return false;
         };
@@ -61,13 +62,15 @@ impl People {
             ..Surroundings::default()
         };
         let found = self.detector.detect(&self.prototype, image, &around, DetectionQuery::Near(track.place));
-        found.into_iter().next().is_some_and(|mut found| {
-            let both = &mut found.detection.pixels;
-            both.sort_unstable();
-            let shared = track.detection.pixels.iter().filter(|pixel| both.binary_search(pixel).is_ok()).count();
-            shared as f64 > (1.0 - LEFT_OVER) * track.detection.pixels.len() as f64
-                && found.root.distance(place) < found.root.distance(track.place)
-        })
+        let Some(mut found) = found.into_iter().next() else { return false };
+        let both = &mut found.detection.pixels;
+        both.sort_unstable();
+        let shared = track.detection.pixels.iter().filter(|pixel| both.binary_search(pixel).is_ok()).count();
+        if shared as f64 <= (1.0 - LEFT_OVER) * track.detection.pixels.len() as f64 {
+            return false;
+        }
+        found.root.distance(place) < found.root.distance(track.place)
+            || self.reactivate(frame, &TentativeTrack::in_image(frame.stamp, found, track.image), number, number)
     }
 
     /// Detects persons in pixels that no person explains, if it is time to.
@@ -334,13 +337,14 @@ impl People {
             let frame = &Frame { positions: &track.positions, ..*depth_frame };
             person.tracker.start_at_positions(frame, ownership, !known)
         } else if person.present {
-            person.tracker.recover(depth_frame, ownership, placed)
+            person.tracker.recover(depth_frame, ownership, track.image, placed)
         } else {
             person.tracker.start_at_detection(depth_frame, ownership, placed, known)
         };
         if came {
             person.present = true;
             person.created = person.created.min(frame.stamp);
+            person.place_known = frame.stamp;
             detected.stature().into_iter().for_each(|reported| person.stature.update(reported));
         }
         person.update(frame, ownership);

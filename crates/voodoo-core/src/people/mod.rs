@@ -144,7 +144,8 @@ impl People {
         let known = self.persons.iter_mut().filter(|known| !known.is_tracked() && far(known) < NEW);
         if let Some(known) = known.min_by(|a, b| far(a).total_cmp(&far(b))) {
             known.tracker.reset(positions, false)?;
-            (known.present, known.place, known.last_tracked) = (true, person.place, stamp);
+            (known.present, known.place) = (true, person.place);
+            (known.last_tracked, known.place_known) = (stamp, stamp);
             return Ok(known.id);
         }
         self.persons.push(person);

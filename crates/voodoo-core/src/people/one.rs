@@ -49,7 +49,7 @@ impl Tracker {
         let others = Config { threads: 1, ..config.clone() };
         let mut people = People::new(body.clone(), others, PeopleOptions::default())?;
         let mut person = Person::new(1, body, config, None, f64::INFINITY)?;
-        (person.followed, person.last_tracked) = (true, f64::NEG_INFINITY);
+        (person.followed, person.last_tracked, person.place_known) = (true, f64::NEG_INFINITY, f64::NEG_INFINITY);
         people.persons.push(person);
         people.next_id += 1;
         Ok(Self { people })
@@ -96,7 +96,8 @@ impl Tracker {
         (*last_detection, *stamp) = (None, None);
         let person = self.followed();
         (person.present, person.stays) = (true, true);
-        (person.created, person.last_tracked) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+        person.created = f64::NEG_INFINITY;
+        (person.last_tracked, person.place_known) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
         person.tracker.estimate()
     }
 
@@ -113,7 +114,8 @@ impl Tracker {
         if !person.present {
             person.tracker.stop(frame.stamp);
             if !(frame.stamp - person.last_tracked < AWAY) {
-                (person.created, person.last_tracked) = (f64::INFINITY, f64::NEG_INFINITY);
+                person.created = f64::INFINITY;
+                (person.last_tracked, person.place_known) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
                 self.people.persons.truncate(1);
             }
         }

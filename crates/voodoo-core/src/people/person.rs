@@ -37,6 +37,8 @@ pub(super) struct Person {
     /// Stamps of the first and of the last tracked frame, seconds.
     pub(super) created: f64,
     pub(super) last_tracked: f64,
+    /// Stamp at which `place` was known, seconds: it follows the time by the probability that the root is there.
+    pub(super) place_known: f64,
     /// Fraction of the time after which the lost person becomes absent, and the stamp up to which it was counted, seconds.
     absence: f64,
     counted: f64,
@@ -69,6 +71,7 @@ impl Person {
             stays: false,
             created: stamp,
             last_tracked: stamp,
+            place_known: stamp,
             absence: 0.0,
             counted: f64::NEG_INFINITY,
             place: Vec3::ZERO,
@@ -102,7 +105,7 @@ impl Person {
 
     /// Returns the cost of the person's being at a position, nats.
     pub(super) fn distance_cost(&self, place: Vec3, stamp: f64) -> f64 {
-        distance_cost(self.place.distance(place), stamp - self.last_tracked)
+        distance_cost(self.place.distance(place), stamp - self.place_known)
     }
 
     /// Returns the cost of the detected stature for this person, nats: all sizes scale with the stature.
@@ -118,6 +121,9 @@ impl Person {
         if self.is_tracked() {
             self.last_tracked = frame.stamp;
             self.place = estimate.world_from_limb.first().map_or(self.place, |root| root.translation);
+            let probability = estimate.limb_probability.first().map_or(0.0, |probability| probability.max(0.0));
+            let elapsed = Some(frame.stamp - self.place_known).filter(|elapsed| (0.0..f64::INFINITY).contains(elapsed));
+            self.place_known = frame.stamp - elapsed.map_or(0.0, |elapsed| (1.0 - probability) * elapsed);
             // Half the interval makes the updates of all persons coincide, so that they need a single picture.
             if frame.stamp - self.last_clothes >= 0.5 * CLOTHES_EVERY && !frame.colors.is_empty() {
                 self.last_clothes = frame.stamp;

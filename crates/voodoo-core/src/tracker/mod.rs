@@ -202,16 +202,24 @@ impl BodyTracker {
         started && self.is_there()
     }
 
-    /// Moves the lost body to a detection of the frame that was stepped last, if that explains the frame better. Returns whether
-    /// the person is there.
-    pub(crate) fn recover(&mut self, frame: &Frame, ownership: OwnershipMask, detection: PlacedDetection) -> bool {
-        self.relocalizer.detection = Some(detection);
-        if !self.is_at_detection(frame, ownership) || !self.move_to_found(frame, ownership) {
+    /// Moves the body to a detection in an image (number) of the frame that was stepped last, if that explains the frame better.
+    /// Returns whether the person moved and is there, not lost at the detection as well.
+    pub(crate) fn recover(
+        &mut self,
+        frame: &Frame,
+        ownership: OwnershipMask,
+        image: usize,
+        detection: PlacedDetection,
+    ) -> bool {
+        (self.relocalizer.image, self.relocalizer.detection) = (image, Some(detection));
+        if !self.is_at_detection(frame, ownership) {
             return false;
         }
+        self.move_to_found();
         if self.relocalizer.check.is_new(frame.stamp) && self.restart_at_detection() {
             self.track(frame, ownership);
         } else {
+            self.assess_found(frame, ownership);
             self.report(frame.stamp, 0, Some(1.0));
         }
         self.is_there()
@@ -258,9 +266,11 @@ impl BodyTracker {
         if config.relocalization {
             match relocalizer.compare(&model.body, &motion.predicted, motion.origin) {
                 Some(DetectionVerdict::Elsewhere) if self.is_at_detection(frame, ownership) => {
-                    let moved = self.motion.stamp.is_none() || self.move_to_found(frame, ownership);
+                    if self.motion.stamp.is_some() {
+                        self.move_to_found();
+                    }
                     // A new track restarts there, because sizes and scene were learned at the wrong position.
-                    if moved && self.relocalizer.check.is_new(frame.stamp) {
+                    if self.relocalizer.check.is_new(frame.stamp) {
                         self.restart_at_detection();
                     }
                     self.relocalizer.forget();
@@ -372,35 +382,28 @@ impl BodyTracker {
         let observation = observer.observation(frame, motion.origin, ownership);
         let context = Context { config, model, observation, previous: &[], time_scale: 1.0 };
         if relocalizer.search(context, fit, &motion.predicted) {
-            self.move_to_found(frame, ownership);
+            // Only the body's surface tells that it is there.
+            self.assess_found(frame, ownership);
+            if self.assessor.status != Status::Lost {
+                self.move_to_found();
+            }
             self.assessor.moved();
         }
     }
 
-    /// Moves the body to the poses that a detection or the search found, if it is not lost there. Returns whether it moved.
-    fn move_to_found(&mut self, frame: &Frame, ownership: OwnershipMask) -> bool {
-        let Motion { poses, predicted, .. } = &mut self.motion;
-        predicted.clone_from(poses);
-        poses.clone_from_slice(&self.relocalizer.found);
-        self.reassess(frame, ownership);
-        if self.assessor.status != Status::Lost {
-            self.motion.forget();
-            return true;
-        }
-        self.moved_to = None;
-        let Motion { poses, predicted, .. } = &mut self.motion;
-        std::mem::swap(poses, predicted);
-        self.observer.begin(frame, ownership, None);
-        self.reassess(frame, ownership);
-        false
+    /// Moves the body to the poses that a detection or the search found.
+    fn move_to_found(&mut self) {
+        self.motion.poses.clone_from_slice(&self.relocalizer.found);
+        self.motion.forget();
     }
 
-    /// Matches and assesses this frame, for poses that were changed.
-    fn reassess(&mut self, frame: &Frame, ownership: OwnershipMask) {
-        let Self { config, model, motion: Motion { poses, previous, origin, .. }, observer, fit, assessor, .. } = self;
+    /// Matches and assesses this frame at the poses that a detection or the search found.
+    fn assess_found(&mut self, frame: &Frame, ownership: OwnershipMask) {
+        let Self { config, model, motion, observer, fit, relocalizer, assessor, .. } = self;
+        let poses = &relocalizer.found;
         let bounds = body_box(&model.body, poses, config.body_box_margin);
-        let observation = observer.gather(frame, *origin, &bounds, ownership, config);
-        let context = Context { config, model, observation, previous, time_scale: 1.0 };
+        let observation = observer.gather(frame, motion.origin, &bounds, ownership, config);
+        let context = Context { config, model, observation, previous: &[], time_scale: 1.0 };
         fit.match_all(context, poses, config.max_steps, true);
         assessor.moved();
         assessor.assess(context, &fit.correspondences, poses, None);
