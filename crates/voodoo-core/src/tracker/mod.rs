@@ -202,8 +202,8 @@ impl BodyTracker {
         started && self.is_there()
     }
 
-    /// Moves the body to a detection in an image (number) of the frame that was stepped last, if that explains the frame better.
-    /// Returns whether the person moved and is there, not lost at the detection as well.
+    /// Moves the body to a detection in an image (number) of the frame that was stepped last, if that explains the frame better, and
+    /// it is not lost there, or is lost where it was not detected. Returns whether the person moved and is there.
     pub(crate) fn recover(
         &mut self,
         frame: &Frame,
@@ -212,14 +212,17 @@ impl BodyTracker {
         detection: PlacedDetection,
     ) -> bool {
         (self.relocalizer.image, self.relocalizer.detection) = (image, Some(detection));
-        if !self.is_at_detection(frame, ownership) {
+        let Self { model, motion, relocalizer, assessor, .. } = self;
+        let elsewhere = |found| trunk_is_elsewhere(found, &model.body, &motion.poses, motion.origin);
+        let lost_here = assessor.status == Status::Lost && relocalizer.detected().is_some_and(elsewhere);
+        if !self.is_at_detection(frame, ownership) || self.is_lost_at_found(frame, ownership) && !lost_here {
+            self.moved_to = None;
             return false;
         }
         self.move_to_found();
         if self.relocalizer.check.is_new(frame.stamp) && self.restart_at_detection() {
             self.track(frame, ownership);
         } else {
-            self.assess_found(frame, ownership);
             self.report(frame.stamp, 0, Some(1.0));
         }
         self.is_there()
@@ -266,12 +269,17 @@ impl BodyTracker {
         if config.relocalization {
             match relocalizer.compare(&model.body, &motion.predicted, motion.origin) {
                 Some(DetectionVerdict::Elsewhere) if self.is_at_detection(frame, ownership) => {
-                    if self.motion.stamp.is_some() {
-                        self.move_to_found();
-                    }
-                    // A new track restarts there, because sizes and scene were learned at the wrong position.
-                    if self.relocalizer.check.is_new(frame.stamp) {
-                        self.restart_at_detection();
+                    let known = self.motion.stamp.is_some();
+                    if known && self.is_lost_at_found(frame, ownership) {
+                        self.moved_to = None;
+                    } else {
+                        if known {
+                            self.move_to_found();
+                        }
+                        // A new track restarts there, because sizes and scene were learned at the wrong position.
+                        if self.relocalizer.check.is_new(frame.stamp) {
+                            self.restart_at_detection();
+                        }
                     }
                     self.relocalizer.forget();
                     // The frame is assessed once, after it is tracked.
@@ -383,8 +391,7 @@ impl BodyTracker {
         let context = Context { config, model, observation, previous: &[], time_scale: 1.0 };
         if relocalizer.search(context, fit, &motion.predicted) {
             // Only the body's surface tells that it is there.
-            self.assess_found(frame, ownership);
-            if self.assessor.status != Status::Lost {
+            if !self.is_lost_at_found(frame, ownership) {
                 self.move_to_found();
             }
             self.assessor.moved();
@@ -397,16 +404,23 @@ impl BodyTracker {
         self.motion.forget();
     }
 
-    /// Matches and assesses this frame at the poses that a detection or the search found.
-    fn assess_found(&mut self, frame: &Frame, ownership: OwnershipMask) {
+    /// Matches and assesses this frame at the poses that a detection or the search found. Returns whether the body is lost there;
+    /// then its status stays.
+    fn is_lost_at_found(&mut self, frame: &Frame, ownership: OwnershipMask) -> bool {
         let Self { config, model, motion, observer, fit, relocalizer, assessor, .. } = self;
         let poses = &relocalizer.found;
         let bounds = body_box(&model.body, poses, config.body_box_margin);
         let observation = observer.gather(frame, motion.origin, &bounds, ownership, config);
         let context = Context { config, model, observation, previous: &[], time_scale: 1.0 };
         fit.match_all(context, poses, config.max_steps, true);
+        let before = assessor.status;
         assessor.moved();
         assessor.assess(context, &fit.correspondences, poses, None);
+        let lost = assessor.status == Status::Lost;
+        if lost {
+            assessor.status = before;
+        }
+        lost
     }
 
     /// Fills the estimate: for a frame `time_scale` after the last one, or, with `None`, for a pose that was set.
