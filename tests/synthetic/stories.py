@@ -84,7 +84,7 @@ def passing(seed: int) -> MadeUpRecording:
 
 
 def four(seed: int, *, seconds: float = 12.0) -> MadeUpRecording:
-    """Four persons enter one after the other and walk to and fro at four depths for 12 s, of which the first are recorded."""
+    """Four persons enter one after the other and walk to and fro at four depths for 12 s; the first `seconds` are recorded."""
     chance = np.random.default_rng((seed, 4))
     people = []
     for number, depth in enumerate(chance.permutation((1.9, 2.5, 3.1, 3.7))):
