@@ -145,7 +145,7 @@ impl People {
         if let Some(known) = known.min_by(|a, b| far(a).total_cmp(&far(b))) {
             known.tracker.reset(positions, false)?;
             (known.present, known.place) = (true, person.place);
-            (known.last_tracked, known.place_known) = (stamp, stamp);
+            known.set_last_tracked(stamp);
             return Ok(known.id);
         }
         self.persons.push(person);

@@ -49,7 +49,8 @@ impl Tracker {
         let others = Config { threads: 1, ..config.clone() };
         let mut people = People::new(body.clone(), others, PeopleOptions::default())?;
         let mut person = Person::new(1, body, config, None, f64::INFINITY)?;
-        (person.followed, person.last_tracked, person.place_known) = (true, f64::NEG_INFINITY, f64::NEG_INFINITY);
+        person.followed = true;
+        person.set_last_tracked(f64::NEG_INFINITY);
         people.persons.push(person);
         people.next_id += 1;
         Ok(Self { people })
@@ -97,7 +98,7 @@ impl Tracker {
         let person = self.followed();
         (person.present, person.stays) = (true, true);
         person.created = f64::NEG_INFINITY;
-        (person.last_tracked, person.place_known) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+        person.set_last_tracked(f64::NEG_INFINITY);
         person.tracker.estimate()
     }
 
@@ -115,7 +116,7 @@ impl Tracker {
             person.tracker.stop(frame.stamp);
             if !(frame.stamp - person.last_tracked < AWAY) {
                 person.created = f64::INFINITY;
-                (person.last_tracked, person.place_known) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+                person.set_last_tracked(f64::NEG_INFINITY);
                 self.people.persons.truncate(1);
             }
         }

@@ -92,6 +92,11 @@ impl Person {
         self.present && self.tracker.is_there()
     }
 
+    /// Sets when the person was tracked last, and their place known: -infinity if they may be anywhere.
+    pub(super) fn set_last_tracked(&mut self, stamp: f64) {
+        (self.last_tracked, self.place_known) = (stamp, stamp);
+    }
+
     /// Whether the person was seen first less than a second ago.
     pub(super) fn is_new(&self) -> bool {
         self.last_tracked - self.created < NEW_TRACK_AGE

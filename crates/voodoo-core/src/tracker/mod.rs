@@ -215,11 +215,9 @@ impl BodyTracker {
         let Self { model, motion, relocalizer, assessor, .. } = self;
         let elsewhere = |found| trunk_is_elsewhere(found, &model.body, &motion.poses, motion.origin);
         let lost_here = assessor.status == Status::Lost && relocalizer.detected().is_some_and(elsewhere);
-        if !self.is_at_detection(frame, ownership) || self.is_lost_at_found(frame, ownership) && !lost_here {
-            self.moved_to = None;
+        if !self.is_at_detection(frame, ownership) || !self.move_to_found(frame, ownership, lost_here) {
             return false;
         }
-        self.move_to_found();
         if self.relocalizer.check.is_new(frame.stamp) && self.restart_at_detection() {
             self.track(frame, ownership);
         } else {
@@ -269,17 +267,10 @@ impl BodyTracker {
         if config.relocalization {
             match relocalizer.compare(&model.body, &motion.predicted, motion.origin) {
                 Some(DetectionVerdict::Elsewhere) if self.is_at_detection(frame, ownership) => {
-                    let known = self.motion.stamp.is_some();
-                    if known && self.is_lost_at_found(frame, ownership) {
-                        self.moved_to = None;
-                    } else {
-                        if known {
-                            self.move_to_found();
-                        }
-                        // A new track restarts there, because sizes and scene were learned at the wrong position.
-                        if self.relocalizer.check.is_new(frame.stamp) {
-                            self.restart_at_detection();
-                        }
+                    let moves = self.motion.stamp.is_none() || self.move_to_found(frame, ownership, false);
+                    // A new track restarts there, because sizes and scene were learned at the wrong position.
+                    if moves && self.relocalizer.check.is_new(frame.stamp) {
+                        self.restart_at_detection();
                     }
                     self.relocalizer.forget();
                     // The frame is assessed once, after it is tracked.
@@ -391,22 +382,14 @@ impl BodyTracker {
         let context = Context { config, model, observation, previous: &[], time_scale: 1.0 };
         if relocalizer.search(context, fit, &motion.predicted) {
             // Only the body's surface tells that it is there.
-            if !self.is_lost_at_found(frame, ownership) {
-                self.move_to_found();
-            }
+            self.move_to_found(frame, ownership, false);
             self.assessor.moved();
         }
     }
 
-    /// Moves the body to the poses that a detection or the search found.
-    fn move_to_found(&mut self) {
-        self.motion.poses.clone_from_slice(&self.relocalizer.found);
-        self.motion.forget();
-    }
-
-    /// Matches and assesses this frame at the poses that a detection or the search found. Returns whether the body is lost there;
-    /// then its status stays.
-    fn is_lost_at_found(&mut self, frame: &Frame, ownership: OwnershipMask) -> bool {
+    /// Matches and assesses this frame at the poses that a detection or the search found, and moves the body there, if it is not lost
+    /// there or `even_lost`. Returns whether it moved; if not, its status stays.
+    fn move_to_found(&mut self, frame: &Frame, ownership: OwnershipMask, even_lost: bool) -> bool {
         let Self { config, model, motion, observer, fit, relocalizer, assessor, .. } = self;
         let poses = &relocalizer.found;
         let bounds = body_box(&model.body, poses, config.body_box_margin);
@@ -416,11 +399,16 @@ impl BodyTracker {
         let before = assessor.status;
         assessor.moved();
         assessor.assess(context, &fit.correspondences, poses, None);
-        let lost = assessor.status == Status::Lost;
-        if lost {
+        let moves = even_lost || assessor.status != Status::Lost;
+        if moves {
+            motion.poses.clone_from_slice(poses);
+            motion.forget();
+        } else {
             assessor.status = before;
+            assessor.moved();
+            self.moved_to = None;
         }
-        lost
+        moves
     }
 
     /// Fills the estimate: for a frame `time_scale` after the last one, or, with `None`, for a pose that was set.
