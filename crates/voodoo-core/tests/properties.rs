@@ -224,17 +224,18 @@ proptest! {
 
     #[test]
     fn limbs_without_data_are_carried_by_their_bands(seed: u64, motion in small_motion(0.08, 0.03)) {
-        let before = scene::standing(&human());
+        let body = human();
+        let before = scene::standing(&body);
         let after = moved(&before, &motion);
         let mut noise = scene::Noise(seed);
-        let (forearm, calf) = (human().limb_index("l_forearm").unwrap(), human().limb_index("r_calf").unwrap());
+        let (forearm, calf) = (body.limb_index("l_forearm").unwrap(), body.limb_index("r_calf").unwrap());
         // Every point is known to be on its limb; two limbs have none.
-        let points = scene::surface_points(&human(), &after, 900, 0.005, &mut noise);
+        let points = scene::surface_points(&body, &after, 900, 0.005, &mut noise);
         let mut by_limb = vec![Vec::new(); 10];
         for point in points {
             let distance = |limb: &usize| {
                 let local = after[*limb].inverse_transform_point(Vec3::from_array(point));
-                human().limbs()[*limb].shape.closest_point(local).signed_distance.abs()
+                body.limbs()[*limb].shape.closest_point(local).signed_distance.abs()
             };
             let nearest = (0..10).min_by(|first, second| distance(first).total_cmp(&distance(second))).unwrap();
             by_limb[nearest].push(point);
@@ -255,9 +256,9 @@ proptest! {
             for limb in [forearm, calf] {
                 prop_assert!(estimate.joint_gaps[limb] < 0.01, "gap {} m", estimate.joint_gaps[limb]);
                 let turned = estimate.world_from_limb[limb].rotation.angle_between(after[limb].rotation);
-                prop_assert!(turned < [0.7, 1.2][count], "{} turned by {turned} rad with {count} points", human().limbs()[limb].name);
+                prop_assert!(turned < [0.7, 1.2][count], "{} turned by {turned} rad with {count} points", body.limbs()[limb].name);
             }
-            let off = largest_distance(&estimate.sites, &sites(&human(), &after));
+            let off = largest_distance(&estimate.sites, &sites(&body, &after));
             prop_assert!(off < 0.35, "a site is {off} m off");
         }
     }
