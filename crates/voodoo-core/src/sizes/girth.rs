@@ -21,10 +21,12 @@ const SHIFT_SIGMA: f64 = 0.03;
 const GIRTH_SIGMA: f64 = 0.12;
 /// Correlation of the relative girths of a limb and its counterpart on the other side.
 const SYMMETRY: f64 = 0.9;
-/// Standard deviation of a surface point and of a depth-contour edge about the model, meters: approximately a pixel.
-const SURFACE_SIGMA: f64 = 0.01;
-/// Maximum number of independent points on a limb: errors of neighbors are correlated.
+/// Standard deviation of a surface point about the model, meters, and the maximum number of independent points on a limb: errors
+/// of neighbors are correlated.
+const POINT_SIGMA: f64 = 0.015;
 const INDEPENDENT: f64 = 30.0;
+/// Standard deviation of a depth-contour edge, meters: approximately a pixel.
+const EDGE_SIGMA: f64 = 0.01;
 /// Share of a limb's shift that is the body's where the pose was found, not given: the error of a detected pose is as large.
 pub(super) const FOUND_SHARE: f64 = 0.5;
 /// Lateral standard deviation of a tracked limb's axis, across the line of sight, meters.
@@ -63,7 +65,7 @@ fn girth_row(shape: &TaperedEllipticCylinder, foot: Vec3, n: Vec3) -> Vector3<f6
 
 /// Cauchy weight of a distance, meters.
 pub(super) fn kernel(distance: f64) -> f64 {
-    1.0 / (1.0 + (distance / (2.0 * SURFACE_SIGMA)).powi(2))
+    1.0 / (1.0 + (distance / (2.0 * POINT_SIGMA)).powi(2))
 }
 
 /// Normal equations of a limb's surface: its shift perpendicular to the axis, and the logarithms of its three factors.
@@ -97,7 +99,7 @@ impl GirthSystem {
     /// Adds an edge of the depth contour.
     fn add_edge(&mut self, shape: &TaperedEllipticCylinder, edge: &DepthEdge) {
         let wider = edge.reach - edge.rim;
-        self.add(shape, edge.foot, edge.side, wider, edge.weight * kernel(wider) / (SURFACE_SIGMA * SURFACE_SIGMA));
+        self.add(shape, edge.foot, edge.side, wider, edge.weight * kernel(wider) / (EDGE_SIGMA * EDGE_SIGMA));
     }
 
     /// Eliminates the shift, which is `so_far` from its mean and has the standard deviation `sigma`, meters. `None` if nothing was
@@ -203,7 +205,7 @@ pub(super) fn first_system(
         let n = working_from_limb.rotation.inverse() * matches.surface.normals.get(index);
         system.add(shape, foot, n, distance, kernel(distance));
     }
-    let information = (INDEPENDENT / points as f64).min(1.0) / (SURFACE_SIGMA * SURFACE_SIGMA);
+    let information = (INDEPENDENT / points as f64).min(1.0) / (POINT_SIGMA * POINT_SIGMA);
     system = GirthSystem { h: system.h * information, g: system.g * information };
     edges.iter().for_each(|edge| system.add_edge(shape, edge));
     Some(system)
@@ -224,7 +226,7 @@ pub(super) fn side_system(
         let front = Vec3::new(a * a * ahead.x / depth, b * b * ahead.y / depth, edge.foot.z);
         thickness += 0.5 * girth_row(shape, front, ahead);
     }
-    (system, thickness * thickness.transpose() / (SURFACE_SIGMA * SURFACE_SIGMA))
+    (system, thickness * thickness.transpose() / (EDGE_SIGMA * EDGE_SIGMA))
 }
 
 impl Girth {
