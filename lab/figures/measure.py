@@ -115,9 +115,9 @@ def wrong_starts(output: Output) -> dict[str, float]:
 
 
 def made_up(output: Output) -> dict[str, float]:
-    """Switches of all scenes but those of four, and of these."""
-    of = {kind: output.found(rf"{kind}: (\d+) switches")[0] for kind in ("returning", "crossing", "passing", "four")}
-    return {"switches": sum(of.values()) - of["four"], "switches_of_four": of["four"]}
+    """Switches of all scenes."""
+    kinds = ("returning", "crossing", "passing", "four")
+    return {"switches": sum(output.found(rf"{kind}: (\d+) switches")[0] for kind in kinds)}
 
 
 def passed_by(output: Output) -> dict[str, float]:
