@@ -30,6 +30,24 @@ pub struct Field {
     pub words: &'static [&'static str],
 }
 
+impl Field {
+    /// Refuses a number outside the range.
+    fn check(&self, value: &Value) -> Result<(), Unexpected> {
+        let number = value.as_float().or_else(|| value.as_integer().map(|number| number as f64));
+        let within = number.zip(self.range).is_none_or(|(number, (low, high))| (low..=high).contains(&number));
+        if within { Ok(()) } else { Err(self.refusal(value)) }
+    }
+
+    fn refusal(&self, value: &Value) -> Unexpected {
+        let expected = match self.range {
+            Some((low, high)) => format!("a number from {low} to {high}"),
+            None if self.words.is_empty() => "true or false".to_owned(),
+            None => format!("one of {}", self.words.join(", ")),
+        };
+        Unexpected::new(self.name, expected, format_args!("{value:?}"))
+    }
+}
+
 macro_rules! config {
     ($(
         $(#[doc = $doc:literal])+
@@ -90,21 +108,26 @@ impl Config {
         let value = value.into();
         let unknown = || Unexpected::new("key", "one of the configuration", format_args!("{key:?}"));
         let field = Self::FIELDS.iter().find(|field| field.name == key).ok_or_else(unknown)?;
-        let number = value.as_float().or_else(|| value.as_integer().map(|number| number as f64));
-        let within = number.zip(field.range).is_none_or(|(number, (low, high))| (low..=high).contains(&number));
-        let mut entries =
-            Table::try_from(&*self).map_err(|error| Unexpected::new("configuration", "entries", error))?;
+        field.check(&value)?;
+        let mut entries = self.entries()?;
         entries.insert(key.to_owned(), value.clone());
-        let changed = entries.try_into().ok().filter(|_| within);
-        *self = changed.ok_or_else(|| {
-            let expected = match field.range {
-                Some((low, high)) => format!("a number from {low} to {high}"),
-                None if field.words.is_empty() => "true or false".to_owned(),
-                None => format!("one of {}", field.words.join(", ")),
-            };
-            Unexpected::new(key, expected, format_args!("{value:?}"))
-        })?;
+        *self = entries.try_into().map_err(|_| field.refusal(&value))?;
         Ok(())
+    }
+
+    /// Refuses a number outside its range.
+    pub(crate) fn check(&self) -> Result<(), Unexpected> {
+        let entries = self.entries()?;
+        Self::FIELDS.iter().try_for_each(|field| entries.get(field.name).map_or(Ok(()), |value| field.check(value)))
+    }
+
+    fn entries(&self) -> Result<Table, Unexpected> {
+        Table::try_from(self).map_err(|error| Unexpected::new("configuration", "entries", error))
+    }
+
+    /// Information of a surface point of weight one, 1/m².
+    pub(crate) fn point_information(&self) -> f64 {
+        1.0 / (self.point_sigma * self.point_sigma)
     }
 }
 
@@ -181,7 +204,7 @@ config! {
     kernel_start: f64 = 0.10, "m", 0.001 ..= 10.0;
     /// Final scale of the robust kernel, for the whole-body solvers.
     kernel_end: f64 = 0.015, "m", 0.001 ..= 10.0;
-    /// Standard deviation of an edge of the depth contour, for the whole-body solvers.
+    /// Standard deviation of an edge of the depth contour.
     depth_contour_sigma: f64 = 0.01, "m", 0.0001 ..= 1.0;
     /// Fraction of the last motion that is extrapolated (0: the body is expected to stand still; whole-body solvers).
     prediction: f64 = 0.6, "", 0.0 ..= 1.0;
@@ -202,7 +225,7 @@ config! {
     relocalization: bool = true, "";
     /// Match the rims of limbs to the depth contour, in the later steps of a frame (whole-body solvers).
     depth_contour: bool = true, "";
-    /// Match the contours of limbs to the color contours in color images (whole-body solvers).
+    /// Find the contours of limbs in color images; whole-body solvers match them.
     regions: bool = true, "";
     /// Match depth pixels inside a limb to the side that faces their camera (whole-body solvers).
     facing: bool = true, "";

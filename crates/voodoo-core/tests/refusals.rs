@@ -8,7 +8,7 @@ use voodoo_core::math::{Pose, Quat, Vec3};
 use voodoo_core::{Body, Config, Status, TaperedEllipticCylinder, TrackError, Tracker};
 use voodoo_core::{Camera, DetectedPerson};
 use voodoo_core::{Cloud, DepthImage, DepthPixels, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope};
-use voodoo_core::{HumanModel, Joint, JointKind, Limb, Site};
+use voodoo_core::{HumanModel, Joint, JointKind, Limb, People, PeopleOptions, Site};
 
 fn started() -> (Tracker, Vec<[f64; 3]>) {
     let body = Body::human(1.75, HumanModel::Papers).unwrap();
@@ -282,4 +282,27 @@ fn configuration_entries_keep_their_ranges() {
     }
     let unknown = Config::default().set("color", true).unwrap_err();
     assert_eq!(unknown.to_string(), "key: expected one of the configuration, found \"color\"");
+}
+
+#[test]
+fn numbers_outside_their_range_and_poses_of_another_body_are_refused() {
+    let body = Body::human(1.75, HumanModel::Papers).unwrap();
+    let mut config = Config::default();
+    config.sampling_factor = 0;
+    let error = Tracker::new(body.clone(), config).unwrap_err();
+    assert_eq!(error.to_string(), "sampling_factor: expected a number from 1 to 1000, found Integer(0)");
+    let mut tracker = Tracker::new(body.clone(), Config::default()).unwrap();
+    let mut poses = scene::standing(&body);
+    poses.push(poses[0]);
+    let error = tracker.segment(&Frame::empty(0.0), Some(&poses)).unwrap_err();
+    assert!(error.to_string().contains("11 poses for 10 limbs"), "{error}");
+}
+
+#[test]
+fn what_was_measured_on_one_of_several_persons_has_the_stamp_of_the_frame() {
+    let (body, options) = (Body::human(1.75, HumanModel::Papers).unwrap(), PeopleOptions::default());
+    let mut people = People::new(body, Config::default(), options).unwrap();
+    let error = people.step(&Frame::empty(1.0), &[(1, Frame::empty(2.0))]).unwrap_err();
+    assert_eq!(error.to_string(), "stamp of what was measured on person 1: expected 1, found 2");
+    people.step(&Frame::empty(1.0), &[(1, Frame::empty(1.0))]).unwrap();
 }

@@ -7,9 +7,9 @@ use voodoo_core::math::Vec3;
 /// Pixels along an edge.
 pub const SIZE: usize = 96;
 /// Its width at the depth of the candidate's center, meters, where it is not enlarged.
-pub const WIDTH: f64 = 2.6;
+pub(crate) const WIDTH: f64 = 2.6;
 /// Range of depth in front of and behind the center that is resolved there, meters.
-pub const DEPTH: f64 = 1.2;
+pub(crate) const DEPTH: f64 = 1.2;
 /// Below this sine of the angle between up and the optical axis, up is not defined in the image.
 const LEAST_UP: f64 = 0.3;
 

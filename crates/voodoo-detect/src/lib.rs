@@ -26,7 +26,7 @@ pub mod segmentation;
 #[cfg(test)]
 mod testing;
 mod view;
-pub mod weights;
+mod weights;
 mod winograd;
 
 pub use components::PersonCandidate;

@@ -1,8 +1,6 @@
 //! Matrix products with trained weights, which are reordered once to be read sequentially.
-//!
-//! No multiplication is fused with an addition: every processor gives the same bits.
 
-use voodoo_core::math::{store, widest};
+use voodoo_core::math::{FMA, multiply_add, store, widest_fused};
 
 /// Number of columns that are processed together.
 const TOGETHER: usize = 16;
@@ -42,21 +40,27 @@ impl Panels {
     /// Multiplies each row of `activations` (`inputs` values) with the weights and adds the biases; writes rows of `outputs`
     /// values to `out`.
     pub(crate) fn apply(&self, activations: &[f32], out: &mut [f32]) {
-        widest(
+        widest_fused(
+            out,
             #[inline(always)]
-            || {
-                for group in 0..self.bias.len() {
-                    let (activations, out) = self.rows::<ROWS>(group, activations, out);
-                    let (activations, out) = self.rows::<FEW_ROWS>(group, activations, out);
-                    self.rows::<1>(group, activations, out);
-                }
-            },
+            |out| self.groups::<FMA>(activations, out),
+            #[inline(always)]
+            |out| self.groups::<true>(activations, out),
         );
+    }
+
+    #[inline(always)]
+    fn groups<const FMA: bool>(&self, activations: &[f32], out: &mut [f32]) {
+        for group in 0..self.bias.len() {
+            let (activations, out) = self.rows::<FMA, ROWS>(group, activations, out);
+            let (activations, out) = self.rows::<FMA, FEW_ROWS>(group, activations, out);
+            self.rows::<FMA, 1>(group, activations, out);
+        }
     }
 
     /// Processes full groups of this number of rows and returns the remaining rows.
     #[inline(always)]
-    fn rows<'a, 'b, const COUNT: usize>(
+    fn rows<'a, 'b, const FMA: bool, const COUNT: usize>(
         &self,
         group: usize,
         activations: &'a [f32],
@@ -71,7 +75,7 @@ impl Panels {
         for (rows, here) in
             activations.chunks_exact(COUNT * self.inputs).zip(out.chunks_exact_mut(COUNT * self.outputs))
         {
-            let sums = product::<COUNT>(rows, panel, &self.bias[group]);
+            let sums = product::<FMA, COUNT>(rows, panel, &self.bias[group]);
             let here = here.chunks_exact_mut(self.outputs);
             here.zip(&sums).for_each(|(row, sums)| store(&mut row[column..][..width], sums));
         }
@@ -81,7 +85,7 @@ impl Panels {
 
 /// Multiplies this number of rows with the columns of a group.
 #[inline(always)]
-fn product<const COUNT: usize>(
+fn product<const FMA: bool, const COUNT: usize>(
     rows: &[f32],
     panel: &[[f32; TOGETHER]],
     bias: &[f32; TOGETHER],
@@ -97,7 +101,7 @@ fn product<const COUNT: usize>(
         for (row, sums) in own.iter().zip(&mut sums) {
             let value = row[input];
             for (sum, weight) in sums.iter_mut().zip(weights) {
-                *sum += value * weight;
+                *sum = multiply_add::<FMA>(value, *weight, *sum);
             }
         }
     }

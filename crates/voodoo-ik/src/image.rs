@@ -6,7 +6,7 @@ use super::view::{NEAREST, SilhouetteView};
 use voodoo_core::math::{Mat3, Vec3};
 
 /// Samples on a projected segment, in place of the sum over its pixels in J10 eq. 5.
-pub const SAMPLES: usize = 8;
+const SAMPLES: usize = 8;
 
 /// A bone that is to lie inside the silhouettes.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -16,7 +16,7 @@ mod view;
 
 pub use bones::{bones, trunk};
 pub use goal::{Aim, Goal, level_cost, level_rows};
-pub use image::{Bone, Criterion, SAMPLES};
+pub use image::{Bone, Criterion};
 pub use model::{ChainModel, Column, Kinematics, Link, Turn};
 pub use project::{project, read};
 pub use solver::{IkProblem, IkSolver, Report, SolverOptions};

@@ -116,7 +116,7 @@ impl Fit {
             // 2 Assign points to limbs.
             self.assign(context, poses, &gate);
             self.contours.clear();
-            if step >= CONTOUR_FROM {
+            if step >= CONTOUR_FROM && context.config.solver.is_whole_body() {
                 self.find_contour(context, poses);
             }
         }
@@ -159,7 +159,7 @@ impl Fit {
 
     /// Writes the relative changes of the lengths of `pairs` of limbs that fit the correspondences at `poses` to `change`. On input,
     /// `change` holds the change from each length to the one it is regularized to, with information `pull`. Returns false when
-    /// the lengths are not determined, or the solver cannot estimate them.
+    /// the lengths are not determined.
     pub(crate) fn lengths(
         &mut self,
         context: Context,
@@ -171,11 +171,9 @@ impl Fit {
     ) -> bool {
         let Self { whole_body, correspondences, .. } = self;
         let step = context.config.max_steps;
-        context.config.solver.is_whole_body() && {
-            // A site with a bias cannot measure a length.
-            whole_body.sum_terms(Problem { context, correspondences, predicted, step }, poses, false);
-            whole_body.chain.lengths(&context.model.body, poses, pairs, pull, change)
-        }
+        // A site with a bias cannot measure a length.
+        whole_body.sum_terms(Problem { context, correspondences, predicted, step }, poses, false);
+        whole_body.chain.lengths(&context.model.body, poses, pairs, pull, change)
     }
 
     /// Warm start: follows the measured positions of named sites before the frame's steps.

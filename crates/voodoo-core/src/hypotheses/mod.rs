@@ -49,7 +49,6 @@ impl Hypotheses {
     pub(crate) fn restart(&mut self) {
         self.unexplained.clutter = 1.0;
         self.branch.motion.poses.clear();
-        self.before.clear();
     }
 
     /// Whether the body left more of the last frame unexplained than is usual.
@@ -114,9 +113,6 @@ impl Hypotheses {
     /// Forgets the motion of the arms and legs that a hypothesis has moved in this frame: they did not move there since the last
     /// frame.
     pub(crate) fn forget_motion(&self, model: &Model, motion: &mut Motion) {
-        if self.before.len() != motion.poses.len() {
-            return;
-        }
         for chain in &model.extremities {
             if is_elsewhere(chain, &self.before, &motion.poses) {
                 motion.forget_joints(&model.body, chain.limbs());

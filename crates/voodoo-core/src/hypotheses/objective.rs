@@ -41,7 +41,7 @@ impl<'a> Objective<'a> {
     pub(crate) fn limb(&self, poses: &[Pose], limb: usize) -> f64 {
         let Self { context, correspondences, regions, .. } = *self;
         let Context { model, observation, config, .. } = context;
-        let information = 1.0 / (config.point_sigma * config.point_sigma);
+        let information = config.point_information();
         let (body, pairs, floor) = (&model.body, &correspondences.detected, observation.floor());
         let cost = |term: &dyn Term| term.cost(body, poses, limb);
         let of_colors = |regions: &ColorRegions| -PATCH * regions.pixel_gain(context.posed(poses), limb)[0];

@@ -1,6 +1,6 @@
 //! The geometry types and conventions of the project.
 //!
-//! Points and rotations are glam's. nalgebra is used for linear algebra only (eigen-problems, Cholesky) and only inside `solver`.
+//! Points and rotations are glam's. nalgebra is used for small matrices and decompositions only.
 //!
 //! Conventions, fixed here for the whole project:
 //! * a transform is named `a_from_b` and maps coordinates in `b` to coordinates in `a`;
@@ -159,7 +159,7 @@ impl Aabb {
 
 /// Maximum distance of a position from its origin, meters: three times the distance to the Moon. Beyond it, squares and products
 /// of coordinates have no digits left for a body, and finally overflow.
-pub(crate) const FARTHEST: f64 = 1e9;
+const FARTHEST: f64 = 1e9;
 
 /// Whether a position is valid: no coordinate is NaN or beyond [`FARTHEST`].
 pub(crate) fn is_place(place: Vec3) -> bool {

@@ -14,10 +14,10 @@ pub(crate) use cholesky::{factor, half_substitute};
 pub use geometry::*;
 pub use linear_sum_assignment::linear_sum_assignment;
 pub use rotations::{euler_angles, is_skewed, quaternion};
-pub use simd::{LANES, load, store, widest};
+pub(crate) use simd::vectorized;
+pub use simd::{FMA, LANES, load, multiply_add, store, widest, widest_fused};
 #[cfg(all(test, target_arch = "x86_64"))]
 pub(crate) use simd::{compiled, has_avx512};
-pub(crate) use simd::{vectorized, widest_fused};
 pub(crate) use weighted_points::WeightedPoints;
 
 /// The cubic that rises smoothly from 0 at `at = 0` to 1 at `at = 1`, and is constant outside.

@@ -55,9 +55,19 @@ pub fn widest<R>(work: impl FnOnce() -> R) -> R {
     work()
 }
 
-/// Runs `fused` as [`widest`] does, with fused multiply-add; `plain` where this processor has no such registers.
+/// Whether the target that the crates are compiled for has fused multiply-add: every aarch64 processor does.
+pub const FMA: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
+
+/// `a * b + c`, rounded once if `FMA`.
 #[inline(always)]
-pub(crate) fn widest_fused<A>(argument: A, plain: impl FnOnce(A), fused: impl FnOnce(A)) {
+pub fn multiply_add<const FMA: bool>(a: f32, b: f32, c: f32) -> f32 {
+    if FMA { a.mul_add(b, c) } else { a * b + c }
+}
+
+/// Runs `fused` as [`widest`] does, with fused multiply-add; `plain` where this processor has none, or no such registers. Their
+/// roundings differ.
+#[inline(always)]
+pub fn widest_fused<A>(argument: A, plain: impl FnOnce(A), fused: impl FnOnce(A)) {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("fma") {
         if has_avx512() {

@@ -36,6 +36,8 @@ pub(crate) struct Background {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Backgrounds {
     pub(super) images: Vec<Background>,
+    /// Depths and rays of a camera before it moved.
+    pub(super) before_move: (Vec<f32>, Vec<[f32; 2]>),
 }
 
 /// Distance between two poses: meters, and radians.

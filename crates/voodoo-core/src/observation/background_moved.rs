@@ -30,7 +30,7 @@ impl Backgrounds {
         }
         let background = &mut self.images[index];
         if leap.is_finite() {
-            background.move_to(image);
+            background.move_to(image, &mut self.before_move);
         } else {
             reset(&mut background.depth, image.pixels.len(), 0.0);
             background.rays.clear();
@@ -49,16 +49,17 @@ impl Background {
     ///
     /// A surface stays on the ray on which it was observed instead of moving to the pixel center, so that rounding errors do not
     /// accumulate.
-    fn move_to(&mut self, image: &DepthImage) {
+    fn move_to(&mut self, image: &DepthImage, (old, old_rays): &mut (Vec<f32>, Vec<[f32; 2]>)) {
         let moved = image.world_from_sensor.inverse() * self.world_from_sensor;
         let turn = columns_f32(&moved);
         let camera = image.camera;
         let width = camera.width();
         let center = |index: usize| camera.pixel_ray(index % width, index / width).map(|value| value as f32);
         let view_at = |[x, y]: [f32; 2]| camera.index_of(Vec3::new(f64::from(x), f64::from(y), 1.0));
-        let (old, old_rays) = (std::mem::take(&mut self.depth), std::mem::take(&mut self.rays));
-        self.depth.resize(old.len(), 0.0);
-        self.rays.resize(old.len(), NO_RAY);
+        std::mem::swap(&mut self.depth, old);
+        std::mem::swap(&mut self.rays, old_rays);
+        reset(&mut self.depth, old.len(), 0.0);
+        reset(&mut self.rays, old.len(), NO_RAY);
         for (index, z) in old.iter().enumerate().filter(|(_, z)| **z > 0.0) {
             let [x, y] = old_rays.get(index).copied().filter(|ray| *ray != NO_RAY).unwrap_or_else(|| center(index));
             let place =

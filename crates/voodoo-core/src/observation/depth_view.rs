@@ -79,7 +79,7 @@ impl DepthView<'_> {
     fn pixel(&self, index: usize) -> Pixel {
         let image = self.image;
         let z = f64::from(image.pixels.get(index)) * image.meters_per_unit;
-        if z.is_nan() || z <= 0.0 {
+        if !(z > 0.0 && z.is_finite()) {
             return if self.segmented { Pixel::Background(f64::INFINITY) } else { Pixel::Unknown };
         }
         match self.background.get(index) {
@@ -147,7 +147,7 @@ pub(crate) struct Shares {
 pub(crate) fn find_segmented(frame: &Frame, found: &mut Vec<bool>) {
     let is_segmented = |image: &DepthImage| {
         let tested = (0..image.pixels.len()).step_by(SEGMENTED_STEP);
-        let none = tested.clone().filter(|index| image.pixels.get(*index) <= 0.0).count();
+        let none = tested.clone().filter(|index| image.depth(*index).is_none()).count();
         none as f64 > SEGMENTED_FRACTION * tested.len() as f64
     };
     refill(found, frame.images.iter().map(is_segmented));
@@ -163,6 +163,21 @@ mod tests {
     /// Every pixel of this image has a different depth, meters.
     fn distinct(count: usize) -> Vec<f32> {
         (0..count).map(|index| 1.0 + 0.01 * index as f32).collect()
+    }
+
+    #[test]
+    fn values_that_are_no_depths_are_no_returns() {
+        for none in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+            let mut pixels = vec![none; 24 * 16];
+            pixels[0] = 2.0;
+            let image = image(&pixels, 24, 20.0);
+            let mut segmented = Vec::new();
+            find_segmented(&Frame { images: &[image], ..Frame::empty(0.0) }, &mut segmented);
+            assert_eq!(segmented, [true], "{none}");
+            let working_from_camera = Pose::IDENTITY;
+            let view = DepthView { image: &image, background: &[], working_from_camera, segmented: false };
+            assert_eq!([view.pixel(0), view.pixel(1)], [Pixel::Foreground(2.0), Pixel::Unknown], "{none}");
+        }
     }
 
     #[test]

@@ -88,7 +88,7 @@ pub struct Cloud<'a> {
     pub source: u16,
 }
 
-/// The pixels of a depth image, row by row: distance along the optical axis; 0 (or NaN) means no return.
+/// The pixels of a depth image, row by row: distance along the optical axis; 0, negative or not finite means no return.
 ///
 /// [`DepthImage`] has an example.
 #[derive(Clone, Copy, Debug)]
@@ -172,8 +172,8 @@ impl DepthImage<'_> {
         (z > 0.0 && z.is_finite()).then_some(z)
     }
 
-    /// Returns the measured depth at the pixel that a world point projects to (0 for no return) and the depth of the point
-    /// itself, meters; `None` outside the image.
+    /// Returns the measured depth at the pixel that a world point projects to (as stored; see [`DepthPixels`] for no return)
+    /// and the depth of the point itself, meters; `None` outside the image.
     pub fn measured(&self, place: Vec3) -> Option<[f64; 2]> {
         let point = self.world_from_sensor.inverse_transform_point(place);
         let index = self.camera.index_of(point)?;

@@ -13,7 +13,7 @@ pub(crate) struct OwnershipMask<'a> {
     pub owners: &'a [Vec<u16>],
     /// Index of this person.
     pub own: u16,
-    /// Number of other persons who may own pixels and points.
+    /// Number of times that others were given pixels and points; 0 if nobody else was.
     pub others: usize,
     /// The static scene, learned where no person was.
     pub scene: &'a Backgrounds,

@@ -165,10 +165,11 @@ impl People {
     /// Returns the middle of those pixels of a segment that nobody owns, world frame, if these are many.
     fn rest_of_segment(&self, image: &DepthImage, number: usize, pixels: &[usize]) -> Option<Vec3> {
         let owners = &self.assignment.owners[number];
-        let free = || pixels.iter().filter(|pixel| owners[**pixel] == NO_OWNER);
-        let place = |pixel: usize| image.back_project(pixel, image.pixels.get(pixel) * image.meters_per_unit as f32);
-        let (count, sum) = (free().count() as f64, free().map(|pixel| place(*pixel)).sum::<Vec3>());
-        (count > LEFT_OVER * pixels.len() as f64).then(|| image.world_from_sensor * (sum / count))
+        let measured = || pixels.iter().filter_map(|pixel| image.depth(*pixel).map(|z| (*pixel, z)));
+        let free = || measured().filter(|(pixel, _)| owners[*pixel] == NO_OWNER);
+        let sum: Vec3 = free().map(|(pixel, z)| image.back_project(pixel, z)).sum();
+        let [count, all] = [free().count(), measured().count()].map(|count| count as f64);
+        (count > LEFT_OVER * all).then(|| image.world_from_sensor * (sum / count))
     }
 
     /// Whether a person detected at a position is to be tracked.
@@ -291,10 +292,12 @@ impl People {
         self.followed().map_or(&self.prototype, |person| person.tracker.body())
     }
 
-    /// Returns the colors of a tentative track's clothes.
+    /// Returns the colors of a tentative track's clothes, where there are color pictures.
     fn clothes_of_track(&self, frame: &Frame, track: &TentativeTrack) -> Clothes {
         let mut clothes = Clothes::default();
-        if let Some((body, poses)) = self.fit_track(track) {
+        if !frame.colors.is_empty()
+            && let Some((body, poses)) = self.fit_track(track)
+        {
             let tracked = |owner: u16| usize::from(owner) < self.persons.len();
             let free = |image: usize, pixel: usize| {
                 self.assignment.owners[image].get(pixel).is_some_and(|owner| !tracked(*owner))
@@ -379,4 +382,31 @@ fn person_cost(person: &Person, size: f64, track: &TentativeTrack, clothes: &Clo
         off.min(1.0) * (off - 0.5 * off.min(1.0)) - LIKE_CLOTHES
     });
     far + size + color
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::body::HumanModel;
+    use crate::config::Config;
+    use crate::people::PeopleOptions;
+    use crate::testing::image;
+
+    #[test]
+    fn the_rest_of_a_segment_is_where_pixels_have_returns() {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let mut people = People::new(body, Config::default(), PeopleOptions::default()).unwrap();
+        let mut pixels = vec![2.0; 24 * 16];
+        people.assignment.owners = vec![vec![NO_OWNER; pixels.len()]];
+        let segment: Vec<usize> = (0..48).collect();
+        let rest = |people: &People, pixels: &[f32]| people.rest_of_segment(&image(pixels, 24, 20.0), 0, &segment);
+        let whole = rest(&people, &pixels).unwrap();
+        assert_eq!(whole.z, 2.0);
+        // The second row has none, the first row is somebody's.
+        pixels[24..48].copy_from_slice(&[0.0, -1.0, f32::NAN, f32::INFINITY].repeat(6));
+        assert_eq!(rest(&people, &pixels).unwrap().z, 2.0);
+        people.assignment.owners[0][..24].fill(0);
+        assert_eq!(rest(&people, &pixels), None);
+    }
 }

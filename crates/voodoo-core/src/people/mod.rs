@@ -18,7 +18,7 @@ mod tentative_tracks;
 use crate::body::Body;
 use crate::config::Config;
 use crate::detect::{BoundDetector, Detect, DetectError};
-use crate::error::TrackError;
+use crate::error::{TrackError, Unexpected};
 use crate::math::Vec3;
 use crate::observation::frame::{DetectedPerson, Frame};
 use crate::threads::Threads;
@@ -74,6 +74,7 @@ pub struct People {
 impl People {
     /// Returns a tracker of no persons. Every new person gets a copy of `prototype`.
     pub fn new(prototype: Body, config: Config, options: PeopleOptions) -> Result<Self, TrackError> {
+        config.check()?;
         let threads = Threads::new(&config)?;
         Ok(Self {
             prototype,
@@ -163,7 +164,13 @@ impl People {
     /// positions and rays, and color pictures, to which nobody else is fitted. On error nothing changes.
     pub fn step(&mut self, frame: &Frame, own: &[(usize, Frame)]) -> Result<(), TrackError> {
         frame.check(&self.prototype, self.stamp)?;
-        own.iter().try_for_each(|(_, frame)| frame.check(&self.prototype, self.stamp))?;
+        for (id, other) in own {
+            other.check(&self.prototype, self.stamp)?;
+            let what = format_args!("stamp of what was measured on person {id}");
+            Unexpected::unless(other.stamp == frame.stamp, what, format_args!("{}", frame.stamp), other.stamp)?;
+            let person = self.persons.iter().find(|person| person.id == *id);
+            person.map_or(Ok(()), |person| person.tracker.check_colors(other))?;
+        }
         self.advance(frame, own);
         Ok(())
     }

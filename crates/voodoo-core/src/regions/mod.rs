@@ -222,7 +222,9 @@ impl ColorRegions {
         for picture in posed.frame.colors {
             self.place_lines(picture, posed);
             let Self { cameras, groups, evidence, .. } = self;
-            let Some(camera) = cameras.get_mut(&picture.number).filter(|camera| camera.known) else { continue };
+            // A camera that changed between grayscale and color has not learned colors yet.
+            let is_known = |camera: &&mut Learned| camera.known && camera.model.gray == picture.pixels.is_gray();
+            let Some(camera) = cameras.get_mut(&picture.number).filter(is_known) else { continue };
             let mut lines = std::mem::take(&mut camera.lines);
             let (unit, view) = (camera.unit, ScanView { picture, camera, groups });
             let working_from_camera = shifted(&picture.world_from_sensor, posed.origin);
@@ -315,5 +317,36 @@ impl ColorRegions {
             }
         }
         camera.model.learn();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Pose;
+    use crate::observation::picture::ColorPixels;
+    use crate::testing::{pinhole, standing};
+
+    #[test]
+    fn a_camera_that_turns_from_grayscale_to_color_has_no_edges_before_it_learned() {
+        let (model, poses) = standing();
+        let (gray, color) = (vec![200; 160 * 120], vec![[200; 3]; 160 * 120]);
+        let mut regions = ColorRegions::default();
+        let mut pairs = Vec::new();
+        let mut edges = |pixels, learns: bool| {
+            let camera = pinhole(160, 120, [140.0, 140.0, 79.5, 59.5]);
+            let colors =
+                [ColorImage { pixels, camera, world_from_sensor: Pose::IDENTITY, stamp: 0.0, number: 0, source: 0 }];
+            let frame = &Frame { colors: &colors, ..Frame::empty(0.0) };
+            let posed = Posed { frame, body: &model.body, poses: &poses, previous: &[], origin: Vec3::ZERO };
+            if learns {
+                regions.begin(posed);
+            }
+            regions.find_single_edges(posed, &mut pairs);
+            assert!(regions.lines(0).count() > 0, "the body is in the picture");
+            pairs.len()
+        };
+        edges(ColorPixels::Gray(&gray), true);
+        assert_eq!(edges(ColorPixels::Color(&color), false), 0);
     }
 }

@@ -141,7 +141,7 @@ impl DetectionCheck {
             return DetectionVerdict::Consistent;
         }
         let Detection { person, facing, .. } = detected.detection;
-        self.elsewhere += person.min(facing.map_or(f64::INFINITY, f64::abs)).min(ENOUGH_ODDS);
+        self.elsewhere += person.min(facing.map_or(f64::INFINITY, f64::abs)).clamp(0.0, ENOUGH_ODDS);
         if self.elsewhere >= ENOUGH_ODDS { DetectionVerdict::Elsewhere } else { DetectionVerdict::Inconsistent }
     }
 
@@ -223,6 +223,13 @@ mod tests {
         };
         assert_eq!([about, aside, near].map(|root| tried(root, 0.05)), [true, true, false]);
         assert!(!tried(aside, 0.2), "within the uncertainty of the detection");
+        // One that is no person does not count against another.
+        let mut check = DetectionCheck::default();
+        let verdicts = [f64::NEG_INFINITY, 5.0].map(|person| {
+            let detection = Detection { person, ..detection_at(aside, 0.05) };
+            check.compare(Detected { detection: &detection, map: &map }, &body, &tracked, Vec3::ZERO)
+        });
+        assert_eq!(verdicts, [DetectionVerdict::Inconsistent, DetectionVerdict::Elsewhere]);
     }
 
     #[test]

@@ -58,10 +58,15 @@ pub(crate) struct Relocalizer {
 impl Relocalizer {
     /// Clears everything that belongs to an earlier track.
     pub(crate) fn restart(&mut self, model: &Model, poses: &[Pose]) {
-        self.lost = 0;
         self.check = DetectionCheck::default();
-        self.detector.bind(&model.body);
         self.floor = None;
+        self.detector.bind(&model.body);
+        self.set_tracked(poses);
+    }
+
+    /// Takes over the poses of a body that counts as tracked.
+    pub(crate) fn set_tracked(&mut self, poses: &[Pose]) {
+        self.lost = 0;
         refill(&mut self.tracked, poses.iter().copied());
     }
 
@@ -155,7 +160,7 @@ impl Relocalizer {
         self.floor = self.detected().filter(|_| auto_initialized).and_then(floor_under);
     }
 
-    /// Runs the detector on the owned part of a frame where that is due. `root` is the expected position of the body, world frame.
+    /// Runs the detector on the owned part of a frame where that is due; nothing was detected in it before. `root` is the expected position of the body, world frame.
     pub(crate) fn detect(
         &mut self,
         body: &Body,
@@ -164,7 +169,6 @@ impl Relocalizer {
         root: Vec3,
         reasons: Reasons,
     ) {
-        self.forget();
         if !self.check.is_due(frame.stamp, reasons, ownership.others) || !self.detector.knows {
             return;
         }

@@ -2,7 +2,7 @@
 
 use super::kernel::{BLOCK, BlockResult, Constants, FEW, MORE, SHORT, closest};
 use super::{Region, TaperedEllipticCylinder};
-use crate::math::{Points, Pose, Vec3, load, store, widest_fused};
+use crate::math::{FMA, Points, Pose, Vec3, load, store, widest_fused};
 use std::ops::Range;
 
 /// Largest [`TaperedEllipticCylinder::aspect_change`] at which results that the f32 kernel marks as settled are accepted: at 0.4
@@ -89,9 +89,6 @@ impl TaperedEllipticCylinder {
         );
     }
 }
-
-/// Whether the target that the crate is compiled for has fused multiply-add: every aarch64 processor does.
-const FMA: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
 
 /// Queries to one shape in its pose, and the output of the results.
 struct Batch<'a> {

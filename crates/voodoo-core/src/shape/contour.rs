@@ -44,8 +44,7 @@ impl TaperedEllipticCylinder {
                 let norm = (1.0 + step * step).sqrt();
                 (c, s) = ((c - step * s) / norm, (s + step * c) / norm);
             }
-            let normal = Vec3::new(b * self.length * c, a * self.length * s, -(a * db * s * s + b * da * c * c));
-            [Vec3::new(a * c, b * s, t * self.length), normal]
+            [Vec3::new(a * c, b * s, t * self.length), self.side_cross([a, b], [c, s])]
         }))
     }
 
@@ -54,9 +53,8 @@ impl TaperedEllipticCylinder {
     /// is not.
     pub(crate) fn rim_contour(&self, distal: bool, [c, s]: [f64; 2], camera: Vec3) -> Option<[Vec3; 2]> {
         let (a, b, z) = if distal { (self.a1, self.b1, self.length) } else { (self.a0, self.b0, 0.0) };
-        let (da, db) = (self.a1 - self.a0, self.b1 - self.b0);
         let point = Vec3::new(a * c, b * s, z);
-        let side = Vec3::new(b * self.length * c, a * self.length * s, -(a * db * s * s + b * da * c * c));
+        let side = self.side_cross([a, b], [c, s]);
         let cap = if distal { camera.z > z } else { camera.z < z };
         ((side.dot(camera - point) > 0.0) != cap).then_some([point, Vec3::new(-a * s, b * c, 0.0)])
     }

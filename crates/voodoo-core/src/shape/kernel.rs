@@ -2,7 +2,7 @@
 
 use super::closest::DISTINCT;
 use super::{RIM_NORMAL_DISTANCE, Region, TaperedEllipticCylinder};
-use crate::math::{Mat3, Pose, Vec3};
+use crate::math::{Mat3, Pose, Vec3, multiply_add as fma};
 
 /// Number of points in a full block; the blocks at the end are shorter. The loop over a block has no branch and no bounds check,
 /// so the compiler vectorizes it at the target's SIMD width.
@@ -106,11 +106,6 @@ impl Constants {
         let t = max(min(z * self.inverse_length, 1.0), 0.0);
         (fma::<FMA>(self.da, t, self.a0), fma::<FMA>(self.db, t, self.b0))
     }
-}
-
-#[inline(always)]
-fn fma<const FMA: bool>(a: f32, b: f32, c: f32) -> f32 {
-    if FMA { a.mul_add(b, c) } else { a * b + c }
 }
 
 /// `max` and `min` as one instruction: the standard functions handle NaN, which is detected at the end here.

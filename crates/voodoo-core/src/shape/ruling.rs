@@ -95,7 +95,12 @@ impl TaperedEllipticCylinder {
         if a.max(b) < 1e-12 {
             (a, b) = (0.5 * (self.a0 + self.a1), 0.5 * (self.b0 + self.b1));
         }
-        let cross = Vec3::new(b * self.length * c, a * self.length * s, -(a * db * s * s + b * da * c * c));
-        cross.try_normalize().unwrap_or(Vec3::new(c, s, 0.0))
+        self.side_cross([a, b], [c, s]).try_normalize().unwrap_or(Vec3::new(c, s, 0.0))
+    }
+
+    /// The product `P_θ × P_t` of [`Self::side_normal`] where the semi-axes are `a` and `b`.
+    pub(super) fn side_cross(&self, [a, b]: [f64; 2], [c, s]: [f64; 2]) -> Vec3 {
+        let (da, db) = (self.a1 - self.a0, self.b1 - self.b0);
+        Vec3::new(b * self.length * c, a * self.length * s, -(a * db * s * s + b * da * c * c))
     }
 }

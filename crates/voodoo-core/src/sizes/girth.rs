@@ -25,8 +25,6 @@ const SYMMETRY: f64 = 0.9;
 /// of neighbors are correlated.
 const POINT_SIGMA: f64 = 0.015;
 const INDEPENDENT: f64 = 30.0;
-/// Standard deviation of a depth-contour edge, meters: approximately a pixel.
-const EDGE_SIGMA: f64 = 0.01;
 /// Share of a limb's shift that is the body's where the pose was found, not given: the error of a detected pose is as large.
 pub(super) const FOUND_SHARE: f64 = 0.5;
 /// Lateral standard deviation of a tracked limb's axis, across the line of sight, meters.
@@ -96,10 +94,10 @@ impl GirthSystem {
         self.g += weight * distance * row;
     }
 
-    /// Adds an edge of the depth contour.
-    fn add_edge(&mut self, shape: &TaperedEllipticCylinder, edge: &DepthEdge) {
+    /// Adds an edge of the depth contour, which has this standard deviation, meters.
+    fn add_edge(&mut self, shape: &TaperedEllipticCylinder, edge: &DepthEdge, sigma: f64) {
         let wider = edge.reach - edge.rim;
-        self.add(shape, edge.foot, edge.side, wider, edge.weight * kernel(wider) / (EDGE_SIGMA * EDGE_SIGMA));
+        self.add(shape, edge.foot, edge.side, wider, edge.weight * kernel(wider) / (sigma * sigma));
     }
 
     /// Eliminates the shift, which is `so_far` from its mean and has the standard deviation `sigma`, meters. `None` if nothing was
@@ -193,6 +191,7 @@ pub(super) fn first_system(
     matches: &LimbMatches,
     working_from_limb: &Pose,
     edges: &[DepthEdge],
+    edge_sigma: f64,
 ) -> Option<GirthSystem> {
     let points = matches.accepted();
     if points < ENOUGH {
@@ -207,7 +206,7 @@ pub(super) fn first_system(
     }
     let information = (INDEPENDENT / points as f64).min(1.0) / (POINT_SIGMA * POINT_SIGMA);
     system = GirthSystem { h: system.h * information, g: system.g * information };
-    edges.iter().for_each(|edge| system.add_edge(shape, edge));
+    edges.iter().for_each(|edge| system.add_edge(shape, edge, edge_sigma));
     Some(system)
 }
 
@@ -216,17 +215,18 @@ pub(super) fn first_system(
 pub(super) fn side_system(
     shape: &TaperedEllipticCylinder,
     edges: impl Iterator<Item = DepthEdge>,
+    edge_sigma: f64,
 ) -> (GirthSystem, Matrix3<f64>) {
     let (mut system, mut thickness) = (GirthSystem::default(), Vector3::zeros());
     for edge in edges {
-        system.add_edge(shape, &edge);
+        system.add_edge(shape, &edge, edge_sigma);
         let ahead = Vec3::new(-edge.side.y, edge.side.x, 0.0);
         let Section { a, b, .. } = shape.section(edge.foot.z / shape.length());
         let depth = (a * ahead.x).hypot(b * ahead.y);
         let front = Vec3::new(a * a * ahead.x / depth, b * b * ahead.y / depth, edge.foot.z);
         thickness += 0.5 * girth_row(shape, front, ahead);
     }
-    (system, thickness * thickness.transpose() / (EDGE_SIGMA * EDGE_SIGMA))
+    (system, thickness * thickness.transpose() / (edge_sigma * edge_sigma))
 }
 
 impl Girth {
@@ -325,7 +325,7 @@ mod tests {
         shape: &TaperedEllipticCylinder,
         edges: impl Iterator<Item = DepthEdge>,
     ) -> Option<[f64; 4]> {
-        let (system, thickness) = side_system(shape, edges);
+        let (system, thickness) = side_system(shape, edges, 0.01);
         girth.follow(&system, ASIDE_SIGMA, 1.0, thickness, &GirthPrior::given(None)?)
     }
 

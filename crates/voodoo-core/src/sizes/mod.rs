@@ -71,7 +71,7 @@ impl Sizes {
         if config.fit_girths {
             self.girths = vec![Girth::default(); model.body.limbs().len()];
         }
-        if config.fit_lengths {
+        if config.fit_lengths && config.solver.is_whole_body() {
             self.follow_lengths(model);
         }
     }
@@ -91,9 +91,8 @@ impl Sizes {
 
     /// Takes over limbs that the user changed: their girths count as given, and the lengths are refined from the new ones.
     pub(crate) fn edited(&mut self, model: &Model) {
-        if !self.open {
-            self.girths.clear();
-        }
+        let open = if self.open && !self.girths.is_empty() { model.body.limbs().len() } else { 0 };
+        self.girths = vec![Girth::default(); open];
         self.color_girths = ColorGirths::default();
         self.set = self.set.is_some().then(|| model.body.clone());
         if !self.pairs.is_empty() {
@@ -133,7 +132,8 @@ impl Sizes {
                     model.body.change_tip(limb, longer.clamp(TIP_FACTORS[0], TIP_FACTORS[1]));
                 }
                 let matches = &fit.correspondences.limbs[limb];
-                if let Some(system) = first_system(&shape, matches, &poses[limb], &edges_found) {
+                let sigma = setting.config.depth_contour_sigma;
+                if let Some(system) = first_system(&shape, matches, &poses[limb], &edges_found, sigma) {
                     start_girth(&mut self.girths, limb, &system, share, &mut model.body, &mut poses[limb]);
                 }
             }
@@ -197,7 +197,8 @@ impl Sizes {
     ) {
         self.color_girths.follow(setting, model, poses, fit);
         for limb in (0..self.girths.len()).filter(|limb| relied_on(*limb)) {
-            let (system, thickness) = side_system(&model.body.limbs()[limb].shape, fit.contours.sides(limb));
+            let shape = &model.body.limbs()[limb].shape;
+            let (system, thickness) = side_system(shape, fit.contours.sides(limb), setting.config.depth_contour_sigma);
             follow_girth(&mut self.girths, limb, &system, (ASIDE_SIGMA, 1.0), thickness, &mut model.body);
         }
     }

@@ -73,7 +73,7 @@ impl WholeBody {
         self.expect_motion(problem);
         let Problem { context, correspondences, predicted, step } = problem;
         let Context { model: Model { body, .. }, config, .. } = context;
-        let information = 1.0 / (config.point_sigma * config.point_sigma);
+        let information = config.point_information();
         let scale = narrowed(config.kernel_start, config.kernel_end, step);
         let root = [config.root_turn_sigma, config.root_shift_sigma]
             .map(|sigma| sigma * context.time_scale * config.motion_scale);
@@ -124,7 +124,7 @@ impl WholeBody {
     fn expect_motion(&mut self, problem: Problem) {
         let Problem { context, correspondences, .. } = problem;
         let Context { model: Model { body, .. }, config, time_scale, .. } = context;
-        let information = 1.0 / (config.point_sigma * config.point_sigma);
+        let information = config.point_information();
         reset(&mut self.edges, body.limbs().len(), 0.0);
         for pair in &correspondences.regions {
             self.edges[pair.limb] += pair.information / information;

@@ -66,7 +66,7 @@ pub(crate) struct Measurements<'a> {
 impl Term for Measurements<'_> {
     fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations) {
         let Self { correspondences, config, scales: [scale, site_scale], biased } = *self;
-        let information = 1.0 / (config.point_sigma * config.point_sigma);
+        let information = config.point_information();
         let terms: [&dyn Term; 4] = [
             &Surface { correspondences, information, tangential_weight: config.tangential_weight, scale },
             &Sites { correspondences, information, scale: site_scale, biased },

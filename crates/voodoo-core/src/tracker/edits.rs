@@ -68,9 +68,9 @@ impl BodyTracker {
             return;
         }
         model.body.close_joints(&mut motion.poses);
+        relocalizer.set_tracked(&motion.poses);
         fit.clear();
         sizes.edited(model);
-        relocalizer.restart(model, &motion.poses);
         assessor.restart(estimate.status);
         self.report(self.motion.stamp.unwrap_or(f64::NAN), 0, None);
     }

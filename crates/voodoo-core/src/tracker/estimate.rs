@@ -15,8 +15,8 @@ use crate::uncertainty::Covariances;
 pub enum Status {
     /// Measurements support the pose.
     Tracking,
-    /// More than a quarter of the limbs are not measured, or the measurements of a source are 15 cm from the pose, root mean
-    /// square.
+    /// More than a quarter of the limbs are not measured, the measurements of a source are 15 cm from the pose, root mean square,
+    /// or no measurement matches it.
     Degraded,
     /// Few measurements support the pose, or the observed surface is flat.
     Lost,

@@ -66,6 +66,7 @@ pub struct BodyTracker {
 impl BodyTracker {
     /// Returns a tracker of `body`. It has no pose yet.
     pub(crate) fn new(body: Body, config: Config) -> Result<Self, TrackError> {
+        config.check()?;
         Ok(Self {
             model: Model::new(body),
             motion: Motion::default(),
@@ -237,6 +238,7 @@ impl BodyTracker {
     /// be detected, to a segment.
     fn relocate(&mut self, frame: &Frame, ownership: OwnershipMask) {
         let Self { config, model, motion, hypotheses, relocalizer, sizes, assessor, .. } = self;
+        relocalizer.forget();
         if !config.solver.is_whole_body() {
             return;
         }
@@ -254,9 +256,7 @@ impl BodyTracker {
             large_excess: ownership.others == 0 && hypotheses.has_large_excess(),
         };
         // A lost body is searched for with everybody's detections, see `crate::People`.
-        if assessor.status == Status::Lost {
-            relocalizer.forget();
-        } else {
+        if assessor.status != Status::Lost {
             relocalizer.detect(&model.body, frame, ownership, root, reasons);
             if let Some(last) = motion.stamp.filter(|_| !interrupted && relocalizer.check.is_detected()) {
                 // One too far from where the person was tracked last is of somebody else.
@@ -317,7 +317,8 @@ impl BodyTracker {
         sizes.initialize(setting, model, poses, fit);
         steps += fit.run(setting.with_model(model), predicted, poses);
         // Alternative hypotheses for arms and legs.
-        if config.hypotheses && whole_body && known && assessor.status != Status::Lost {
+        let improves = config.hypotheses && whole_body && known && assessor.status != Status::Lost;
+        if improves {
             steps += hypotheses.improve(setting.with_model(model), fit, poses, predicted, relocalizer.detected());
         }
         // Refinement of the sizes with this frame.
@@ -331,7 +332,9 @@ impl BodyTracker {
         if config.regions {
             fit.regions.learn(frame);
         }
-        hypotheses.forget_motion(model, motion);
+        if improves {
+            hypotheses.forget_motion(model, motion);
+        }
         motion.commit(frame.stamp);
         self.relocalizer.observe(self.assessor.status, self.observer.silent(frame), &self.motion.poses);
         self.report(frame.stamp, steps, Some(time_scale));
@@ -351,6 +354,11 @@ impl BodyTracker {
             return Err(TrackError::NotInitialized);
         }
         frame.check(&self.model.body, self.motion.stamp)?;
+        self.check_colors(frame)
+    }
+
+    /// Checks the color pictures of a frame.
+    pub(crate) fn check_colors(&self, frame: &Frame) -> Result<(), TrackError> {
         self.fit.regions.check(frame)
     }
 
@@ -388,7 +396,7 @@ impl BodyTracker {
     }
 
     /// Matches and assesses this frame at the poses that a detection or the search found, and moves the body there, if it is not lost
-    /// there or `even_lost`. Returns whether it moved; if not, its status stays.
+    /// there or `even_lost`. Returns whether it moved; if not, the assessment of where it is stays.
     fn move_to_found(&mut self, frame: &Frame, ownership: OwnershipMask, even_lost: bool) -> bool {
         let Self { config, model, motion, observer, fit, relocalizer, assessor, .. } = self;
         let poses = &relocalizer.found;
@@ -396,16 +404,14 @@ impl BodyTracker {
         let observation = observer.gather(frame, motion.origin, &bounds, ownership, config);
         let context = Context { config, model, observation, previous: &[], time_scale: 1.0 };
         fit.match_all(context, poses, config.max_steps, true);
-        let before = assessor.status;
-        assessor.moved();
+        assessor.exchange();
         assessor.assess(context, &fit.correspondences, poses, None);
         let moves = even_lost || assessor.status != Status::Lost;
         if moves {
             motion.poses.clone_from_slice(poses);
             motion.forget();
         } else {
-            assessor.status = before;
-            assessor.moved();
+            assessor.exchange();
             self.moved_to = None;
         }
         moves

@@ -6,7 +6,7 @@ use crate::body::Body;
 use crate::config::Config;
 use crate::error::{TrackError, Unexpected};
 use crate::math::{Aabb, Points, Pose, Vec3, shifted};
-use crate::observation::frame::{Frame, PointSlice};
+use crate::observation::frame::{Frame, PointSlice, check_poses};
 use crate::regions::{ColorRegions, Posed, RegionLine};
 use crate::shape::SurfaceBatch;
 
@@ -42,11 +42,12 @@ impl BodyTracker {
         poses: Option<&[Pose]>,
         work: impl FnOnce(&mut ColorRegions, Posed) -> R,
     ) -> Result<R, TrackError> {
-        if poses.is_none() {
-            self.started()?;
+        match poses {
+            Some(poses) => check_poses(&self.model.body, poses)?,
+            None => self.started()?,
         }
         frame.check(&self.model.body, None)?;
-        self.fit.regions.check(frame)?;
+        self.check_colors(frame)?;
         let current: Vec<Pose> = self.motion.world_from_limb().collect();
         let (body, previous, origin) = (&self.model.body, &[][..], Vec3::ZERO);
         Ok(work(&mut self.fit.regions, Posed { frame, body, poses: poses.unwrap_or(&current), previous, origin }))

@@ -2,7 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use super::*;
-use crate::testing::{before_wall, farthest, moved, put_board, standing, with_frame};
+use crate::Detection;
+use crate::observation::background::Backgrounds;
+use crate::testing::{before_wall, everything, farthest, moved, put_board, standing, with_frame};
 use crate::{Ground, Tracker};
 
 /// Returns a tracker that has tracked the standing body for three frames, and the image.
@@ -133,4 +135,49 @@ fn a_leg_that_a_board_hides_comes_to_stand_where_the_floor_is_known() {
     };
     let [known, unknown] = [Some(ground), None].map(tilt);
     assert!(known < 0.3 && unknown > 0.8, "{known}, {unknown}");
+}
+
+/// Positions of all sites of the standing body.
+fn positions() -> Vec<(usize, Vec3)> {
+    let (model, poses) = standing();
+    (0..model.body.sites().len()).map(|site| (site, model.body.site_position(&poses, site))).collect()
+}
+
+#[test]
+fn a_limb_that_is_added_before_the_sizes_are_fitted_is_fitted_too() {
+    let (model, poses) = standing();
+    let mut tracker = Tracker::new(model.body.clone(), Config::default()).unwrap();
+    tracker.reset(&positions(), true).unwrap();
+    let hand = &model.body.limbs()[model.body.limb_index("r_hand").unwrap()];
+    let (shape, mut joint) = (hand.shape, hand.parent.as_ref().unwrap().1.clone());
+    joint.parent_from_joint.translation = Vec3::Z * shape.length();
+    tracker.add_limb("held", "r_hand", shape, joint, Vec::new()).unwrap();
+    assert_eq!(feed(&mut tracker, &before_wall(&model.body, &poses), 0), Status::Tracking);
+    assert_eq!(tracker.estimate().covariances.girths.len(), model.body.limbs().len() + 1);
+}
+
+#[test]
+fn the_limbwise_solver_reports_no_lengths_and_keeps_no_detection() {
+    let (model, poses) = standing();
+    let config = Config { solver: crate::SolverKind::Limbwise, ..Config::default() };
+    let mut tracker = BodyTracker::new(model.body.clone(), config).unwrap();
+    tracker.reset(&positions(), true).unwrap();
+    tracker.relocalizer.detection =
+        Some(PlacedDetection { index: 0, root: Vec3::ZERO, detection: Detection::default() });
+    let scene = Backgrounds::default();
+    with_frame(&before_wall(&model.body, &poses), 0.0, |frame| tracker.step(frame, everything(&scene)));
+    assert!(tracker.relocalizer.detected().is_none());
+    let lengths = &tracker.estimate.covariances.lengths;
+    assert!(!lengths.is_empty() && lengths.iter().all(|sigma| sigma.is_nan()), "{lengths:?}");
+}
+
+#[test]
+fn an_edit_keeps_the_floor_and_what_confirmed_the_track() {
+    let (model, poses) = standing();
+    let mut tracker = BodyTracker::new(model.body.clone(), Config::default()).unwrap();
+    tracker.reset_pose(&poses).unwrap();
+    tracker.relocalizer.floor = Some(Ground { normal: Vec3::Z, offset: 0.0 });
+    tracker.relocalizer.check.confirmed = true;
+    tracker.scale(1.02).unwrap();
+    assert!(tracker.relocalizer.floor.is_some() && tracker.is_confirmed(0.0));
 }

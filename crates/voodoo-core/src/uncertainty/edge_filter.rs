@@ -123,7 +123,7 @@ impl EdgeFilter {
             let loose = extremities.iter().flat_map(TwoBone::limbs).all(|other| other != limb);
             block.h *= if loose { LOOSE * weight } else { weight };
         }
-        let information = 1.0 / (config.point_sigma * config.point_sigma);
+        let information = config.point_information();
         Sites { correspondences, information, scale: SITE_SCALE, biased: true }.add(body, poses, normal);
     }
 }

@@ -72,7 +72,7 @@ impl Uncertainty {
         self.known.clear();
     }
 
-    /// Returns the covariances of a frame's pose; `proven` states which limbs the frame confirms at their estimated poses.
+    /// Writes the covariances of a frame's pose; `proven` states which limbs the frame confirms at their estimated poses.
     pub(crate) fn estimate(
         &mut self,
         found: FittedPose,
@@ -113,7 +113,7 @@ impl Uncertainty {
         }
     }
 
-    /// Returns the information of every unknown before the frame: that after the last frame, reduced by the motion since.
+    /// Computes the information of every unknown before the frame: that after the last frame, reduced by the motion since.
     fn expect(&mut self, found: FittedPose) {
         let Self { variance, information, .. } = self;
         let FittedPose { model, time_scale, config, .. } = found;
@@ -135,7 +135,7 @@ impl Uncertainty {
         }
     }
 
-    /// Returns the frame's information on every limb, limited to the number of independent measurements.
+    /// Sums the frame's information on every limb, limited to the number of independent measurements.
     fn sum_terms(&mut self, found: FittedPose, proven: impl Fn(usize) -> bool) {
         let FittedPose { model: Model { body, .. }, poses, correspondences, config, .. } = found;
         let normal = &mut self.chain.normal;

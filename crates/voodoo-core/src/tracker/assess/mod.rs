@@ -60,6 +60,8 @@ pub(super) struct Assessor {
     internal: Vec<LimbStatus>,
     /// Log odds that each limb is right, of which its reported status and probability are functions.
     log_odds: Vec<f64>,
+    /// The three while another pose is assessed.
+    aside: (Status, Vec<LimbStatus>, Vec<f64>),
     exclusive: Exclusive,
     raycasters: Vec<LimbRaycaster>,
     supports: Vec<LimbSupport>,
@@ -87,6 +89,15 @@ impl Assessor {
         self.round = [ROUND[1]; 2];
     }
 
+    /// Exchanges what the last assessment found for what was set aside before. Only the current frame is evidence then.
+    pub(super) fn exchange(&mut self) {
+        let Self { status, internal, log_odds, aside, .. } = self;
+        std::mem::swap(status, &mut aside.0);
+        std::mem::swap(internal, &mut aside.1);
+        std::mem::swap(log_odds, &mut aside.2);
+        self.moved();
+    }
+
     /// Sets the body and all its limbs to lost.
     fn give_up(&mut self) {
         self.status = Status::Lost;
@@ -108,8 +119,7 @@ impl Assessor {
         self.internal.get(limb) == Some(&LimbStatus::Measured)
     }
 
-    /// Updates the internal status of the body and its limbs. `detected` is the detection of this frame, if there is one and the
-    /// pose was not taken from it.
+    /// Updates the internal status of the body and its limbs. `detected` is the detection of this frame, if there is one.
     pub(super) fn assess(
         &mut self,
         context: Context,
