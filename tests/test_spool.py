@@ -14,7 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import voodoo
 from commands import run
+from test_doors import track_of
 from voodoo.export.people import PeopleTrack
 from voodoo.export.spool import Spool, recover
 from voodoo.export.track import Track
@@ -113,6 +115,24 @@ def test_what_others_left_is_not_followed_out_of_the_folder(tmp_path):
         (hidden / KEPT).write_text(note)
         assert run("recover", tmp_path / "in").exit_code == 1
     assert [file.name for file in (tmp_path / "in").iterdir()] == ["out.mcap", hidden.name]
+
+
+def in_parts(paths, track, body):
+    """A spool with the poses of each frame in a part of its own."""
+    spool = Spool(paths, root_frame=lambda: "odom", together=1)
+    for number in range(len(track)):
+        spool.add(track.of_frames(np.array([number])), {1: body})
+    return spool
+
+
+def test_poses_that_a_format_cannot_hold_are_kept_and_recovered_as_arrays(tmp_path):
+    body = voodoo.Body.human()
+    track = track_of(body).of_frames(np.array([0, 2, 1]))  # a clock that was set back
+    done, errors = in_parts([tmp_path / "pose.bvh", tmp_path / "pose.csv"], track, body).write()
+    assert done == [tmp_path / "pose.csv"] and "rising times" in str(errors[0]) and "voodoo recover" in str(errors[1])
+    assert recover(tmp_path) == ([tmp_path / "pose.bvh.npz"], [])
+    assert Track.load(tmp_path / "pose.bvh.npz").stamps.tolist() == track.stamps.tolist()
+    assert len(list(tmp_path.iterdir())) == 2
 
 
 @pytest.mark.parametrize(

@@ -151,7 +151,8 @@ class Spool(AbstractContextManager["Spool"]):
     ) -> tuple[list[Path], list[Exception]]:
         """Write the outputs, whatever becomes of each; returns the files, and what failed.
 
-        The folder is removed when all of them are complete; it is kept for those that a disk has no place for.
+        The folder is removed when all of them are complete. It is kept for those that failed, and for NAME.npz instead of those
+        whose format cannot hold the poses.
 
         Args:
             turn: how outputs are turned upright; None: by the axes of the root frame if that is an optical frame.
@@ -170,7 +171,7 @@ class Spool(AbstractContextManager["Spool"]):
         how |= {"numbered": self._numbered, "left_out": left_out or {}}
         done, errors = written(self.paths, lambda path: _write(path, contents, **how))
         failed = list(errors.values())
-        failing = [path for path in self._kept_for if isinstance(errors.get(path), OSError)]
+        failing = [_later(path, errors[path]) for path in self._kept_for if path in errors]
         if not failing:
             self._hidden.remove()
             return done, failed
@@ -208,6 +209,11 @@ class Spool(AbstractContextManager["Spool"]):
     @property
     def _kept(self) -> str:
         return f"the poses are kept in {self._hidden.folder}; voodoo recover makes the files"
+
+
+def _later(path: Path, error: Exception) -> Path:
+    """What `recover` makes of poses for an output that failed: of those that its format cannot hold, arrays."""
+    return path if isinstance(error, OSError) or is_table(path) else path.with_name(f"{path.name}.npz")
 
 
 def _stored(paths: Sequence[Path]) -> Iterator[Arrays]:
