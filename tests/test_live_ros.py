@@ -1,5 +1,6 @@
 """ROS 2 messages of a live source, without a network: what they become, and what is published."""
 
+import math
 import re
 import time
 from dataclasses import replace
@@ -78,6 +79,18 @@ def test_old_transforms_are_forgotten_and_those_that_hold_are_not():
     (edge, _) = feed._tree._neighbors["base_link"]["head"]
     assert len(edge.stamps) <= 10.0 / 0.02 + 1
     assert feed.root_from("camera", 60.98)[0, 3] == pytest.approx(1.0 + 2.999)
+
+
+def test_constant_transforms_that_are_repeated_are_forgotten_but_for_the_last():
+    tree = TransformTree("test", max_age=0.5)
+    tree.add_edge("b", "c", 0.0, moved(2.0), static=True)
+    for number in range(100):
+        tree.add_edge("a", "b", float(number), moved(1.0), static=False)
+        tree.keep(number - 10.0, math.inf)
+    (edge, _) = tree._neighbors["a"]["b"]
+    assert len(edge.stamps) == 11
+    tree.keep(-10.0, -1.0)  # time jumped back
+    assert tree.lookup("a", "c", 50.0)[0, 3] == 3.0 and edge.stamps == [-1.0]
 
 
 def test_transforms_follow_time_that_jumps_back():
