@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import voodoo._core as _core
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, reading
 from voodoo.export import ros2
 from voodoo.export.human_frames import placed_names
 from voodoo.export.layout import Layout
@@ -69,7 +69,7 @@ class Ros2Sink(Output):
             raise VoodooError(
                 f"{address}: expected {ADDRESS} without a host, found one; ROS_DOMAIN_ID chooses the network"
             )
-        self._root = root_frame
+        self._root, self._on_message = root_frame, on_message
         self._node = Node(quiet=True) if node is None else node
         self._topics: dict[str, Publication] = {}
         self._displayed: dict[int, Body] = {}
@@ -123,7 +123,12 @@ class Ros2Sink(Output):
         if self._resets.take() and self.on_reset is not None:
             self.on_reset()
         for raw in self._follows.take():
-            chosen: Any = ros2.STORE.deserialize_cdr(raw, _PLACE)
+            try:
+                with reading(FOLLOW, f"a {_PLACE} message", error=VoodooError):
+                    chosen: Any = ros2.STORE.deserialize_cdr(raw, _PLACE)
+            except VoodooError as error:
+                self._on_message(f"{self.name}: {error}")
+                continue
             if self.on_choice is not None:
                 self.on_choice(chosen.header.frame_id, np.array([chosen.point.x, chosen.point.y, chosen.point.z]))
 
