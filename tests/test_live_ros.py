@@ -1,8 +1,10 @@
 """ROS 2 messages of a live source, without a network: what they become, and what is published."""
 
+import gc
 import math
 import re
 import time
+import weakref
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -26,6 +28,7 @@ from voodoo.live.source import SourceGone
 from voodoo.live.sources.played import PlayedSource
 from voodoo.live.sources.ros2 import Ros2Source, listing
 from voodoo.measurements import ColorImage, DepthImage, LaserScan, PointCloud
+from voodoo.people import FORGET_AFTER_S
 from voodoo.pipeline.floor import visible_floor
 from voodoo.pipeline.front_end import nobody
 from voodoo.pipeline.run import start_tracker, track
@@ -368,6 +371,22 @@ def test_several_people_are_published_as_a_bag_has_them(root):
             for part, axes in (("translation", "xyz"), ("rotation", "xyzw")):
                 here, there = ([getattr(getattr(each.transform, part), axis) for axis in axes] for each in (found, one))
                 np.testing.assert_allclose(here, there, atol=1e-12)
+
+
+def test_topics_of_who_left_are_withdrawn():
+    node, alive = FakeNode(), weakref.WeakValueDictionary()
+    advertise = node.advertise
+    node.advertise = lambda topic, *about, **how: alive.setdefault(topic, advertise(topic, *about, **how))
+    output = Ros2Sink(root_frame=lambda: "odom", node=node)
+    recording = open_recording(sample_path(), use=("depth",))
+    tracker = start_tracker(recording)
+    estimate = next(track(recording, tracker)).estimate
+    for stamp, numbers in ((1.0, (1, 10)), (2.0, (10,)), (2.0 + FORGET_AFTER_S, (10,))):
+        how = dict.fromkeys(numbers, estimate), dict.fromkeys(numbers, tracker.body)
+        output.publish(Step(LiveFrame(stamp, (), 0, 0.0, 0.0, False), *how, 0.0))
+        gc.collect()
+        people = {person for topic in alive for person in ("p1", "p10") if re.search(rf"[/_]{person}(/|$)", topic)}
+        assert people == ({"p10"} if stamp > FORGET_AFTER_S else {"p1", "p10"})
 
 
 def test_a_frame_is_written_in_as_few_messages_as_it_has_topics_and_encoded_once(monkeypatch):
