@@ -128,8 +128,8 @@ def on_disk(source: str) -> Iterator[Path]:
 
 def name_of(source: str) -> str:
     """Name of a recording: that of its file or folder, without suffix."""
-    name = source.rstrip("/").rsplit("/", 1)[-1]
-    return re.sub(r"(_depth\.mat|\.mcap|\.db3|\.bag|\.zip|\.trc|\.c3d)$", "", name) or "recording"
+    name = local_path(source).name if is_local(source) else source.rstrip("/").rsplit("/", 1)[-1]
+    return re.sub(r"(_depth\.mat|\.mcap|\.db3|\.bag|\.zip|\.mkv|\.trc|\.c3d)$", "", name) or "recording"
 
 
 def named(sources: Sequence[str], taken: dict[str, str]) -> list[tuple[str, str]]:
