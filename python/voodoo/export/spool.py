@@ -276,10 +276,15 @@ def recover(folder: str | Path, *, taken: Iterable[Path] = ()) -> tuple[list[Pat
         try:
             if hidden.stat().st_uid != getattr(os, "geteuid", lambda: 0)() or not (hidden / KEPT).is_file():
                 continue
-            if (lock := locked(hidden)) is not None:
-                try:
-                    _recover_one(hidden, others, done, failed)
-                finally:
+            if (lock := locked(hidden)) is None:
+                continue
+            whole = False
+            try:
+                whole = _recover_one(hidden, others, done, failed)
+            finally:
+                if whole:
+                    removed(hidden, lock)
+                else:
                     os.close(lock)
         except (VoodooError, OSError) as error:
             failed.append(error)
@@ -288,7 +293,8 @@ def recover(folder: str | Path, *, taken: Iterable[Path] = ()) -> tuple[list[Pat
     return done, failed
 
 
-def _recover_one(hidden: Path, taken: set[Path], done: list[Path], failed: list[Exception]) -> None:
+def _recover_one(hidden: Path, taken: set[Path], done: list[Path], failed: list[Exception]) -> bool:
+    """Make the outputs of a session; returns whether nothing of it is left to be made."""
     with reading(hidden / KEPT, "what a session left", error=VoodooError):
         note = json.loads(read_stored_text(hidden / KEPT, "what a session left", most=MOST_METADATA))
         free = {Path(str(name)).name: _free(hidden.parent / Path(str(name)).name, taken) for name in note["paths"]}
@@ -301,8 +307,7 @@ def _recover_one(hidden: Path, taken: set[Path], done: list[Path], failed: list[
             elif left.exists():
                 move_whole(left, path)
             done += [path] if path.exists() else []
-        removed(hidden)
-        return
+        return True
     bodies: dict[int, Body] = {}
     parts: list[Path] = []
     for path in sorted(hidden.glob("*.npz")):
@@ -333,8 +338,7 @@ def _recover_one(hidden: Path, taken: set[Path], done: list[Path], failed: list[
             _later(hidden.parent / name, errors[path]).name for name, path in free.items() if path in errors
         ]
         write_whole(hidden / KEPT, json.dumps(note))
-    else:
-        removed(hidden)
+    return not errors
 
 
 def _free(path: Path, taken: set[Path]) -> Path:
