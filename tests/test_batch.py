@@ -170,10 +170,15 @@ def test_recordings_are_found_and_fetched_by_url(tmp_path):
     import fsspec
 
     files = fsspec.filesystem("memory")
-    for name in ("a/bag/metadata.yaml", "a/init.json", "b.mcap", "deep/c_depth.mat", "deep/readme.txt"):
+    for name in ("a/bag/metadata.yaml", "a/init.json", "b.mcap", "deep/c_depth.mat", "deep/d.mkv", "deep/readme.txt"):
         files.pipe_file(f"/lab/{name}", name.encode())
     found = find_sources(["memory://lab"])
-    assert found == ["memory:///lab/a", "memory:///lab/b.mcap", "memory:///lab/deep/c_depth.mat"]
+    assert found == [
+        "memory:///lab/a",
+        "memory:///lab/b.mcap",
+        "memory:///lab/deep/c_depth.mat",
+        "memory:///lab/deep/d.mkv",
+    ]
     assert find_sources(["memory://lab/*.mcap"]) == ["memory:///lab/b.mcap"]
     assert find_sources(["memory://lab"], only=["a"]) == ["memory:///lab/a"]
     with on_disk(found[0]) as path:

@@ -111,7 +111,7 @@ class RosRecording(Recording):
         if self.complete:
             self._check_together(sources)
 
-        place = path if path.suffix == ".zip" else self._bag.file
+        place = path if path.suffix.lower() == ".zip" else self._bag.file
         self.name = next(part for part in (place.stem, *(p.name for p in place.resolve().parents)) if part != "bag")
         if not bare:
             find, first = partial(find_beside, place), self._driver.first_stamp
