@@ -455,6 +455,12 @@ def test_a_wrong_topic_says_which_there_are(monkeypatch):
         Ros2Source(["/wrong"]).open(HandClock(1.0), Faults(None))
 
 
+@pytest.mark.parametrize("wrong", [{"meters_per_unit": -1.0}, {"meters_per_unit": "two"}, {"tf_max_age": math.nan}])
+def test_numbers_of_topics_are_checked_as_those_of_bags(wrong):
+    with pytest.raises(voodoo.RecordingError, match=f"ros2:/depth: {next(iter(wrong))}: expected"):
+        Ros2Source(["/depth"], **wrong)
+
+
 def test_a_message_lets_everybody_be_searched_for_again():
     node, asked = FakeNode(), []
     output = Ros2Sink(root_frame=lambda: "base_link", node=node)
