@@ -20,7 +20,7 @@ from voodoo.export.upright import by_axes, by_floor
 from voodoo.live import Faults, Live, Step
 from voodoo.live.assembly import LiveFrame
 from voodoo.live.recorder import _cloud, _depth, _scan, camera_info, transforms
-from voodoo.live.ros2.dds import Offer, dds_name, ros_name
+from voodoo.live.ros2.dds import _LOOPBACK, Node, Offer, dds_name, ros_name
 from voodoo.live.ros2.feed import ROOT_PATIENCE_S, TF, RosFeed
 from voodoo.live.session import Output, Session
 from voodoo.live.sinks.ros2 import RESET, Ros2Sink
@@ -216,6 +216,19 @@ def test_names_of_types():
     assert dds_name("sensor_msgs/msg/Image") == "sensor_msgs::msg::dds_::Image_"
     assert ros_name("sensor_msgs::msg::dds_::Image_") == "sensor_msgs/msg/Image"
     assert ros_name("DCPSParticipant") == ""
+
+
+def test_nodes_of_this_machine_find_each_other_by_its_address(monkeypatch):
+    """The name of its interface differs between systems."""
+    pytest.importorskip("cyclonedds", reason="pip install cyclonedds, of the extra ros2")
+    assert "NetworkInterface name" not in _LOOPBACK
+    monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
+    monkeypatch.setenv("ROS_DOMAIN_ID", "77")
+    one, other = Node(), Node()
+    publication, until = one.advertise("/here", "std_msgs/msg/String"), time.monotonic() + 5.0
+    while not (found := other.offers()) and time.monotonic() < until:
+        time.sleep(0.01)
+    assert found.keys() == {"/here"} and publication.subscribers == 0
 
 
 LAMP = Path(__file__).resolve().parent.parent / "examples/bodies/lamp.toml"
