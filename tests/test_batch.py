@@ -11,7 +11,7 @@ import sys
 import time
 from dataclasses import replace
 from importlib.machinery import ModuleSpec
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from types import ModuleType
 
 import numpy as np
@@ -85,13 +85,15 @@ def test_a_table_of_summaries_is_read_as_it_was_written():
             read_table(wrong, "summary.csv")
 
 
-def test_every_recording_has_a_name_of_its_own_and_keeps_it():
+def test_every_recording_has_a_name_of_its_own_and_keeps_it(monkeypatch):
     sources = ["/a/walk", "/b/walk.mcap", "s3://c/walk/", "/d/a1_s1_t1_depth.mat"]
     first = named(sources, {})
     assert [name for name, _ in first] == ["walk", "walk~2", "walk~3", "a1_s1_t1"]
     again = named(["/e/walk", *reversed(sources)], dict(first))
     assert dict(again[1:]) == dict(first) and again[0] == ("walk~4", "/e/walk")
     assert name_of("/x/y.z.bag") == "y.z"
+    monkeypatch.setattr("voodoo.batch.storage.local_path", PureWindowsPath)
+    assert name_of(r"C:\takes\walk.mkv") == "walk"
 
 
 def test_columns_hold_every_frame_of_everybody():
@@ -168,10 +170,15 @@ def test_recordings_are_found_and_fetched_by_url(tmp_path):
     import fsspec
 
     files = fsspec.filesystem("memory")
-    for name in ("a/bag/metadata.yaml", "a/init.json", "b.mcap", "deep/c_depth.mat", "deep/readme.txt"):
+    for name in ("a/bag/metadata.yaml", "a/init.json", "b.mcap", "deep/c_depth.mat", "deep/d.mkv", "deep/readme.txt"):
         files.pipe_file(f"/lab/{name}", name.encode())
     found = find_sources(["memory://lab"])
-    assert found == ["memory:///lab/a", "memory:///lab/b.mcap", "memory:///lab/deep/c_depth.mat"]
+    assert found == [
+        "memory:///lab/a",
+        "memory:///lab/b.mcap",
+        "memory:///lab/deep/c_depth.mat",
+        "memory:///lab/deep/d.mkv",
+    ]
     assert find_sources(["memory://lab/*.mcap"]) == ["memory:///lab/b.mcap"]
     assert find_sources(["memory://lab"], only=["a"]) == ["memory:///lab/a"]
     with on_disk(found[0]) as path:

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 import voodoo
+from commands import run
 from scene import rest_pose
 from voodoo import BodyError, VoodooError
 
@@ -226,3 +227,7 @@ def test_any_start_is_taken_or_refused(joints):
 
 if __name__ == "__main__":
     (EXAMPLES / "human.toml").write_text(shipped_human())
+
+
+def test_the_body_that_is_printed_is_the_one_that_is_tracked():
+    assert run("body").stdout == voodoo.Body.human().to_toml()

@@ -419,6 +419,16 @@ def test_c3d_read_by_ezc3d(tmp_path, person):
     assert read_c3d(tmp_path / "pose.c3d").up == "+Z"
 
 
+def test_sites_that_a_c3d_cannot_hold_are_refused(tmp_path, person):
+    names = tuple(f"site_{number}" for number in range(256))
+    track = Track(
+        np.arange(2.0), ("tracking",) * 2, np.zeros(2), names, np.zeros((2, 256, 3)), (), np.empty((2, 0, 4, 4))
+    )
+    with pytest.raises(voodoo.VoodooError, match=r"pose\.c3d: expected joints and sites .* found 256"):
+        save(track, tmp_path / "pose.c3d", body=person[1], root_frame="odom")
+    assert not list(tmp_path.iterdir())
+
+
 def test_equal_motions_of_both_sides_have_equal_angles_with_the_signs_of_opensim(tmp_path):
     body = voodoo.Body.human()
     parts = bones(body)

@@ -145,6 +145,7 @@ def test_find_recordings_searches_folders_in_natural_order(tmp_path):
     (tmp_path / "walk" / "bag").mkdir(parents=True)
     (tmp_path / "walk" / "bag" / "bag.mcap").touch()
     (tmp_path / "notes").mkdir()
+    (tmp_path / "notes" / "notes.txt").touch()
     names = [path.name for path in find_recordings([tmp_path])]
     assert names == ["a2_s1_t1_depth.mat", "a2_s2_t1_depth.mat", "a10_s1_t1_depth.mat", "walk"]
     assert [path.name for path in find_recordings([tmp_path], only=["w*"])] == ["walk"]
@@ -155,6 +156,10 @@ def test_find_recordings_searches_folders_in_natural_order(tmp_path):
         find_recordings([tmp_path / "missing"])
     with pytest.raises(RecordingError, match="none in it"):
         find_recordings([tmp_path / "notes"])
+    files = ["a.TRC", "b.c3d", "c.mkv", "d.mcap", "e.DB3", "f.bag"]
+    for name in files:
+        (tmp_path / "notes" / name).touch()
+    assert [path.name for path in find_recordings([tmp_path / "notes"])] == files
 
 
 def test_depth_points_are_where_the_camera_saw_them():

@@ -446,6 +446,16 @@ def test_trc_and_bag_leave_searching_frames_empty(tmp_path, tracked):
         assert sum(connection.topic == "/tf" for connection, _, _ in reader.messages()) == 0
 
 
+def test_a_bag_of_stamps_that_do_not_rise_has_the_pose_of_each(tmp_path, tracked):
+    track, body = tracked
+    bags = []
+    for name, order in (("rising", np.arange(len(track))), ("falling", np.arange(len(track))[::-1])):
+        write_bag(tmp_path / name, track.of_frames(order), body, root_frame="odom")
+        with AnyReader([tmp_path / name]) as reader:
+            bags.append([(one.topic, stamp, raw) for one, stamp, raw in reader.messages()])
+    assert bags[0] == bags[1]
+
+
 def test_stamps_that_no_bag_can_hold_leave_no_folder(tmp_path, tracked):
     track, body = tracked
     early = replace(track, stamps=track.stamps - track.stamps[0] - 1.0)

@@ -114,6 +114,16 @@ def test_a_file_of_several_people_has_each_while_it_is_there(tmp_path):
 
 
 @needs_foxglove
+def test_a_stamp_that_the_format_cannot_hold_is_named(tmp_path):
+    body = voodoo.Body.human()
+    track = track_of(body)
+    early = replace(track, stamps=track.stamps - track.stamps[1])
+    with pytest.raises(voodoo.VoodooError, match="stamps: expected none before zero"):
+        save(early, tmp_path / "pose.foxglove.mcap", body=body, root_frame="odom")
+    assert not list(tmp_path.iterdir())
+
+
+@needs_foxglove
 def test_a_command_writes_it_whole_or_not_at_all(tmp_path):
     output = tmp_path / "pose.foxglove.mcap"
     assert run("track", sample_path(), "--use", "depth", "--out", output, "--out", tmp_path / "pose.npz").exit_code == 0

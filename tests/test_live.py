@@ -3,6 +3,8 @@
 import math
 import threading
 import time
+from functools import partial
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -377,6 +379,17 @@ def test_sources_that_do_not_go_together_are_refused(second, messages):
 def test_sources_must_be_there():
     with pytest.raises(VoodooError, match="at least one"):
         voodoo.live.open()
+
+
+def test_sources_that_are_open_are_closed_where_another_one_is_gone_for_good(monkeypatch):
+    first, second, closed = Cameras("one", "front"), Cameras("two", "back"), []
+    second.stays = False
+    monkeypatch.setattr(second, "open", Mock(side_effect=SourceGone("no such file")))
+    for source in (first, second):
+        monkeypatch.setattr(source, "close", partial(closed.append, source))
+    with pytest.raises(SourceGone, match="no such file"), voodoo.live.open(first, second):
+        pass
+    assert closed == [first, second]
 
 
 def test_a_loop_needs_the_with_block():

@@ -86,15 +86,18 @@ def test_a_single_person_is_the_one_at_the_place(recording, frames, chosen):
 
 
 def test_a_message_chooses_the_person(recording, monkeypatch):
-    node, asked = FakeNode(), []
-    output = Ros2Sink(root_frame=lambda: "base_link", node=node)
+    node, asked, said = FakeNode(), [], []
+    output = Ros2Sink(root_frame=lambda: "base_link", node=node, on_message=said.append)
     output.on_choice = lambda *choice: asked.append(choice)
-    node.heard[FOLLOW] = [message("odom", (1.0, 2.0, 3.0))]
+    node.heard[FOLLOW] = [b"damage", message("odom", (1.0, 2.0, 3.0))]
     step = Step(LiveFrame(2.0, (), 1, 0.0, 0.0, False), {1: nobody(2.0)}, {1: voodoo.Body.human()}, 0.0)
     output.publish(step)
     output.publish(step)
     ((frame, place),) = asked
     assert frame == "odom" and place.tolist() == [1.0, 2.0, 3.0]
+    assert len(said) == 1 and said[0].startswith(
+        "ros2: /voodoo/follow: expected a geometry_msgs/msg/PointStamped message"
+    )
     # and the session follows whoever is there, in a frame 1 m in front of the root frame
     ahead = np.eye(4)
     ahead[0, 3] = 1.0

@@ -1,7 +1,10 @@
 """ROS 2 messages of a live source, without a network: what they become, and what is published."""
 
+import gc
+import math
 import re
 import time
+import weakref
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -17,7 +20,7 @@ from voodoo.export.upright import by_axes, by_floor
 from voodoo.live import Faults, Live, Step
 from voodoo.live.assembly import LiveFrame
 from voodoo.live.recorder import _cloud, _depth, _scan, camera_info, transforms
-from voodoo.live.ros2.dds import Offer, dds_name, ros_name
+from voodoo.live.ros2.dds import _LOOPBACK, Node, Offer, dds_name, ros_name
 from voodoo.live.ros2.feed import ROOT_PATIENCE_S, TF, RosFeed
 from voodoo.live.session import Output, Session
 from voodoo.live.sinks.ros2 import RESET, Ros2Sink
@@ -25,6 +28,7 @@ from voodoo.live.source import SourceGone
 from voodoo.live.sources.played import PlayedSource
 from voodoo.live.sources.ros2 import Ros2Source, listing
 from voodoo.measurements import ColorImage, DepthImage, LaserScan, PointCloud
+from voodoo.people import FORGET_AFTER_S
 from voodoo.pipeline.floor import visible_floor
 from voodoo.pipeline.front_end import nobody
 from voodoo.pipeline.run import start_tracker, track
@@ -78,6 +82,18 @@ def test_old_transforms_are_forgotten_and_those_that_hold_are_not():
     (edge, _) = feed._tree._neighbors["base_link"]["head"]
     assert len(edge.stamps) <= 10.0 / 0.02 + 1
     assert feed.root_from("camera", 60.98)[0, 3] == pytest.approx(1.0 + 2.999)
+
+
+def test_constant_transforms_that_are_repeated_are_forgotten_but_for_the_last():
+    tree = TransformTree("test", max_age=0.5)
+    tree.add_edge("b", "c", 0.0, moved(2.0), static=True)
+    for number in range(100):
+        tree.add_edge("a", "b", float(number), moved(1.0), static=False)
+        tree.keep(number - 10.0, math.inf)
+    (edge, _) = tree._neighbors["a"]["b"]
+    assert len(edge.stamps) == 11
+    tree.keep(-10.0, -1.0)  # time jumped back
+    assert tree.lookup("a", "c", 50.0)[0, 3] == 3.0 and edge.stamps == [-1.0]
 
 
 def test_transforms_follow_time_that_jumps_back():
@@ -200,6 +216,19 @@ def test_names_of_types():
     assert dds_name("sensor_msgs/msg/Image") == "sensor_msgs::msg::dds_::Image_"
     assert ros_name("sensor_msgs::msg::dds_::Image_") == "sensor_msgs/msg/Image"
     assert ros_name("DCPSParticipant") == ""
+
+
+def test_nodes_of_this_machine_find_each_other_by_its_address(monkeypatch):
+    """The name of its interface differs between systems."""
+    pytest.importorskip("cyclonedds", reason="pip install cyclonedds, of the extra ros2")
+    assert "NetworkInterface name" not in _LOOPBACK
+    monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
+    monkeypatch.setenv("ROS_DOMAIN_ID", "77")
+    one, other = Node(), Node()
+    publication, until = one.advertise("/here", "std_msgs/msg/String"), time.monotonic() + 5.0
+    while not (found := other.offers()) and time.monotonic() < until:
+        time.sleep(0.01)
+    assert found.keys() == {"/here"} and publication.subscribers == 0
 
 
 LAMP = Path(__file__).resolve().parent.parent / "examples/bodies/lamp.toml"
@@ -357,6 +386,22 @@ def test_several_people_are_published_as_a_bag_has_them(root):
                 np.testing.assert_allclose(here, there, atol=1e-12)
 
 
+def test_topics_of_who_left_are_withdrawn():
+    node, alive = FakeNode(), weakref.WeakValueDictionary()
+    advertise = node.advertise
+    node.advertise = lambda topic, *about, **how: alive.setdefault(topic, advertise(topic, *about, **how))
+    output = Ros2Sink(root_frame=lambda: "odom", node=node)
+    recording = open_recording(sample_path(), use=("depth",))
+    tracker = start_tracker(recording)
+    estimate = next(track(recording, tracker)).estimate
+    for stamp, numbers in ((1.0, (1, 10)), (2.0, (10,)), (2.0 + FORGET_AFTER_S, (10,))):
+        how = dict.fromkeys(numbers, estimate), dict.fromkeys(numbers, tracker.body)
+        output.publish(Step(LiveFrame(stamp, (), 0, 0.0, 0.0, False), *how, 0.0))
+        gc.collect()
+        people = {person for topic in alive for person in ("p1", "p10") if re.search(rf"[/_]{person}(/|$)", topic)}
+        assert people == ({"p10"} if stamp > FORGET_AFTER_S else {"p1", "p10"})
+
+
 def test_a_frame_is_written_in_as_few_messages_as_it_has_topics_and_encoded_once(monkeypatch):
     encoded = []
     monkeypatch.setattr("voodoo.export.ros2.cdr", lambda message: encoded.append(message) or cdr(message))
@@ -421,6 +466,12 @@ def test_a_wrong_topic_says_which_there_are(monkeypatch):
     monkeypatch.setattr("voodoo.live.sources.ros2._DISCOVERY_S", 0.0)
     with pytest.raises(SourceGone, match=r"/wrong: expected somebody .* published are /depth$"):
         Ros2Source(["/wrong"]).open(HandClock(1.0), Faults(None))
+
+
+@pytest.mark.parametrize("wrong", [{"meters_per_unit": -1.0}, {"meters_per_unit": "two"}, {"tf_max_age": math.nan}])
+def test_numbers_of_topics_are_checked_as_those_of_bags(wrong):
+    with pytest.raises(voodoo.RecordingError, match=f"ros2:/depth: {next(iter(wrong))}: expected"):
+        Ros2Source(["/depth"], **wrong)
 
 
 def test_a_message_lets_everybody_be_searched_for_again():

@@ -196,6 +196,22 @@ def test_who_was_away_has_an_unbroken_track_with_a_gap(followed):
     assert len(gone.unbroken(1, to_the_end=True)) >= len(unbroken)
 
 
+def test_an_unbroken_track_is_in_the_order_of_frames_whose_stamps_do_not_rise(followed):
+    result, _ = followed
+    track = result.tracks[1].of_frames(np.arange(4))
+    late, start = track.stamps[3], track.stamps[0]
+    stamps = np.array([late, start, track.stamps[1], late + 1.0])
+    set_back = PeopleTrack(stamps, {1: track.of_frames(np.array([0, 1, 3]))})
+    unbroken = set_back.unbroken(1, to_the_end=True)
+    assert unbroken.stamps.tolist() == stamps.tolist()
+    assert unbroken.status[3] == SEARCHING
+    np.testing.assert_array_equal(unbroken.joints[:3], track.joints[[3, 0, 1]])
+    for wrong in ([start, start, late], [start, late, late + 9.0]):
+        twice_or_of_no_frame = PeopleTrack(stamps, {1: replace(track.of_frames(np.arange(3)), stamps=np.array(wrong))})
+        with pytest.raises(VoodooError, match="person 1: expected one row for a frame"):
+            twice_or_of_no_frame.unbroken(1)
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".npz"])
 def test_readers_of_one_person_take_the_only_one_and_refuse_several(followed, tmp_path, suffix):
     result, _ = followed

@@ -8,6 +8,7 @@ from array import array
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -179,6 +180,25 @@ def test_fingerprint_sees_what_is_no_pose(change):
     else:
         new[change] = "other"
     assert compare.compare(old, new).what
+
+
+def test_fingerprint_runs_the_cases_after_one_that_ends_its_process(tmp_path, monkeypatch):
+    fingerprint = load("fingerprint")
+    (tmp_path / "worker.py").write_text("""
+import json, os, sys, time
+for line in sys.stdin:
+    if "ends" in json.loads(line)["arguments"]:
+        os.close(1)
+        time.sleep(0.2)
+        os._exit(1)
+    print("{}", flush=True)
+""")
+    monkeypatch.setattr(fingerprint, "SCRIPTS", tmp_path)
+    monkeypatch.setattr(fingerprint, "WORKER_FILES", ("worker.py",))
+    build = SimpleNamespace(name="old", python=sys.executable, folder=tmp_path, results=tmp_path)
+    build.kept, build.result = (lambda _: False), (lambda case, _: tmp_path / case.name)
+    cases = [fingerprint.Case(name, "command", (name,)) for name in ("first", "ends", "next", "last")]
+    assert fingerprint.run_all(build, cases, {}, tmp_path, 1) == {"ends": "the process ended"}
 
 
 def test_fingerprint_lists_every_kind_of_case():

@@ -474,6 +474,7 @@ def test_addresses_that_are_no_use_are_named(tmp_path):
         "vmc://": r"vmc://: expected SCHEME://HOST:PORT",
         "vmc://my host": r"vmc://my host: expected SCHEME://HOST:PORT",
         "vmc://127.0.0.1:99999": r"expected SCHEME://HOST:PORT, found: Port out of range",
+        "ws://a..b": r"ws://a\.\.b: expected SCHEME://HOST:PORT, found: .*label empty",
         "vmc://no-such-host.invalid": "expected the name or address of a host",
         "ws://203.0.113.7:8000": "expected a free address of this machine",
         taken: "expected a free address of this machine",

@@ -5,6 +5,7 @@ import json
 import os
 import re
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -14,7 +15,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import voodoo
 from commands import run
+from test_doors import track_of
+from voodoo.errors import VoodooError
 from voodoo.export.people import PeopleTrack
 from voodoo.export.spool import Spool, recover
 from voodoo.export.track import Track
@@ -113,6 +117,58 @@ def test_what_others_left_is_not_followed_out_of_the_folder(tmp_path):
         (hidden / KEPT).write_text(note)
         assert run("recover", tmp_path / "in").exit_code == 1
     assert [file.name for file in (tmp_path / "in").iterdir()] == ["out.mcap", hidden.name]
+
+
+def in_parts(paths, track, body):
+    """A spool with the poses of each frame in a part of its own."""
+    spool = Spool(paths, root_frame=lambda: "odom", together=1)
+    for number in range(len(track)):
+        spool.add(track.of_frames(np.array([number])), {1: body})
+    return spool
+
+
+def test_poses_that_a_format_cannot_hold_are_kept_and_recovered_as_arrays(tmp_path):
+    body = voodoo.Body.human()
+    track = track_of(body).of_frames(np.array([0, 2, 1]))  # a clock that was set back
+    done, errors = in_parts([tmp_path / "pose.bvh", tmp_path / "pose.csv"], track, body).write()
+    assert done == [tmp_path / "pose.csv"] and "rising times" in str(errors[0]) and "voodoo recover" in str(errors[1])
+    assert recover(tmp_path) == ([tmp_path / "pose.bvh.npz"], [])
+    assert Track.load(tmp_path / "pose.bvh.npz").stamps.tolist() == track.stamps.tolist()
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_a_leftover_that_cannot_be_recovered_is_named_and_kept(tmp_path):
+    """And a format that fails there costs the others nothing, and is not tried again."""
+    body = voodoo.Body.human()
+    spool = in_parts(
+        [tmp_path / "pose.csv", tmp_path / "pose.bvh"], track_of(body).of_frames(np.array([0, 2, 1])), body
+    )
+    (hidden,) = tmp_path.iterdir()
+    note = json.loads((hidden / KEPT).read_text())
+    (hidden / KEPT).write_text(json.dumps({name: note[name] for name in ("paths", "root_frame")}))  # an earlier version
+    spool._hidden.close()
+    parts = {part: part.read_bytes() for part in hidden.glob("*.npz")}
+    for part in parts:
+        part.write_bytes(b"damage")
+    done, failed = recover(tmp_path)
+    assert done == [] and f"{hidden}: expected poses that were tracked, found none" in str(failed[-1])
+    for part, content in parts.items():
+        part.write_bytes(content)
+    done, (error,) = recover(tmp_path)
+    assert done == [tmp_path / "pose.csv"] and "rising times" in str(error)
+    assert recover(tmp_path) == ([tmp_path / "pose.bvh.npz"], []) and not hidden.exists()
+
+
+def test_a_recording_whose_channel_has_no_schema_is_named_and_kept(tmp_path):
+    bag = tmp_path / ".take.mcap-abcdefgh.voodoo" / "take.mcap" / "take.mcap"
+    bag.parent.mkdir(parents=True)
+    (bag.parents[1] / KEPT).write_text(json.dumps({"paths": ["take.mcap"]}))
+    channel = struct.pack("<BQ", 4, 8) + struct.pack("<HHI", 1, 1, 0)
+    message = struct.pack("<BQ", 5, 22) + bytes(22)
+    chunk = bytes(32) + struct.pack("<Q", len(channel + message)) + channel + message
+    bag.write_bytes(b"\x89MCAP0\r\n" + struct.pack("<BQ", 6, len(chunk)) + chunk)
+    done, (error,) = recover(tmp_path)
+    assert done == [] and isinstance(error, VoodooError) and str(bag.parents[1]) in str(error) and bag.exists()
 
 
 @pytest.mark.parametrize(

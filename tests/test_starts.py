@@ -3,6 +3,7 @@
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from scene import standing_joints, turn
 from voodoo.errors import BodyError, MeasurementError, VoodooError
 from voodoo.measurements import DepthImage, KeypointImage, LaserScan, MarkerSet, RecordedFrame
 from voodoo.model.camera import Camera
+from voodoo.names import HumanModel
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.run import first_pose
 from voodoo.pipeline.start import Init, pose_as_init, start_tracker, starts_of, stature
@@ -315,7 +317,9 @@ def test_the_found_pose_is_a_start(tmp_path):
     assert Init.load(tmp_path / "start.json") == written
     assert written.height_m == pytest.approx(recording.start["height_m"], abs=0.08)
     assert np.linalg.norm(np.subtract(written.joints["l_knee"], rows["l_knee"])) < 0.06
-    assert stature(voodoo.Body.human(1.6, model="papers")) == 1.6 and stature(legs_body()) is None
+    for model in get_args(HumanModel):
+        assert stature(voodoo.Body.human(1.6, model=model)) == 1.6
+    assert stature(legs_body()) is None
 
 
 def test_what_nothing_can_find_is_reported_at_once(tmp_path):

@@ -1,10 +1,13 @@
 """Outputs appear when they are complete, never in the place of what is read, and independently of each other."""
 
 import errno
+import fcntl
 import os
 import re
 import shutil
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -42,15 +45,33 @@ def test_the_old_file_stays_until_the_new_one_is_complete_and_no_link_is_followe
     assert {file.name for file in tmp_path.iterdir()} == {"pose.csv", "victim", ".pose.csv.part"}
 
 
-def test_a_folder_appears_whole_too(tmp_path):
+def test_a_folder_appears_whole_too(tmp_path, monkeypatch):
     with appearing_whole(tmp_path / "bag") as place:
         place.mkdir()
         (place / "a").write_text("a")
         assert not (tmp_path / "bag").exists()
     assert [file.name for file in (tmp_path / "bag").iterdir()] == ["a"]
+    (tmp_path / "empty").mkdir()
+    # Windows renames no folder to one that exists.
+    replace = os.replace
+    monkeypatch.setattr("os.replace", lambda one, other: (full if Path(one).is_dir() else replace)(one, other))
+    with appearing_whole(tmp_path / "empty") as place:
+        place.mkdir()
+        (place / "a").write_text("a")
+    assert [file.name for file in (tmp_path / "empty").iterdir()] == ["a"]
 
 
-def test_what_a_killed_process_left_is_removed_unless_it_is_kept_or_in_use(tmp_path):
+def lock_as_windows_does(descriptor, mode, count):
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise PermissionError from None
+
+
+@pytest.mark.parametrize("system", ["linux", "win32"])
+def test_what_a_killed_process_left_is_removed_unless_it_is_kept_or_in_use(tmp_path, monkeypatch, system):
+    monkeypatch.setattr("voodoo.whole.sys.platform", system)
+    monkeypatch.setitem(sys.modules, "msvcrt", SimpleNamespace(locking=lock_as_windows_does, LK_NBLCK=2))
     path = tmp_path / "pose.csv"
     in_use, kept, left = Hidden(path), Hidden(path), Hidden(path)
     kept.keep(paths=["pose.csv"])

@@ -14,5 +14,7 @@ TOPIC_KINDS: tuple[TopicKind, ...] = get_args(TopicKind)
 INPUTS = ("depth", "points", "scan", "keypoints", "skin", "color", "markers")
 """Kinds of measurements that a front end can use; `voodoo.sensors.adapters.register` adds others. Skin and color are two cues of
 the same images: rays of head and hands, and the color regions of all limbs."""
+ROS1_SUFFIXES, ROS2_SUFFIXES = (".bag",), (".mcap", ".db3")
+"""Suffixes of bags."""
 SEARCHING = "searching"
 """Status of a frame without a pose: no person was found yet, or the person has left."""

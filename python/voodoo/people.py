@@ -21,6 +21,8 @@ __all__ = ["ONE", "Followed", "People", "PeopleEstimate", "Person", "everybody"]
 
 ONE = 1
 """Number of the person whom a `Tracker` follows."""
+FORGET_AFTER_S = 60.0
+"""By default a person who was away for longer counts as new [s]."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,7 @@ class People:
         detector: AnyDetector = "shipped",
         limit: int | None = None,
         nearest: bool = False,
-        forget_after: float = 60.0,
+        forget_after: float = FORGET_AFTER_S,
         region: tuple[Sequence[float], Sequence[float]] | None = None,
     ) -> None:
         """Start without persons.

@@ -39,7 +39,7 @@ class RegionLines(NamedTuple):
 class Tracker:
     """Tracks one body through frames.
 
-    Use a tracker from one thread at a time: during a step, any other call to it raises RuntimeError. Different trackers can
+    Use a tracker from one thread at a time: during a step, any other call to it raises VoodooError. Different trackers can
     run in parallel, since `step` releases the GIL. Create a tracker with several threads (`Config.threads`) in the process
     that steps it: its threads do not survive a fork, and a step after a fork would wait for them forever.
 

@@ -48,8 +48,7 @@ class Hidden:
             with suppress(OSError):
                 ours = left.name.startswith(start) and left.name.endswith(SUFFIX)
                 if ours and left not in _open and not (left / KEPT).exists() and (lock := locked(left)) is not None:
-                    removed(left)
-                    os.close(lock)
+                    removed(left, lock)
         self._lock: int | None = None
         while self._lock is None:  # somebody took it for one that was left
             self.folder = Path(tempfile.mkdtemp(dir=path.parent, prefix=start, suffix=SUFFIX))
@@ -65,22 +64,26 @@ class Hidden:
 
     def remove(self) -> None:
         """Delete the folder."""
-        removed(self.folder)
-        self.close()
+        removed(self.folder, self._unlocked())
 
     def close(self) -> None:
         """Leave the folder to others."""
+        if (lock := self._unlocked()) != _UNLOCKED:
+            os.close(lock)
+
+    def _unlocked(self) -> int:
         _open.discard(self.folder)
-        if self._lock is not None and self._lock != _UNLOCKED:
-            os.close(self._lock)
-        self._lock = _UNLOCKED
+        lock, self._lock = self._lock, _UNLOCKED
+        return _UNLOCKED if lock is None else lock
 
 
-def removed(folder: Path) -> None:
-    """Delete a hidden folder; what a crash leaves of it is not kept."""
+def removed(folder: Path, lock: int) -> None:
+    """Delete a hidden folder and close its lock, which Windows does not delete before; what a crash leaves of it is not kept."""
     with suppress(OSError):
         (folder / KEPT).unlink(missing_ok=True)
-        shutil.rmtree(folder, ignore_errors=True)
+    if lock != _UNLOCKED:
+        os.close(lock)
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def locked(folder: Path) -> int | None:
@@ -89,14 +92,17 @@ def locked(folder: Path) -> int | None:
     Raises:
         OSError: the folder is gone, or the system has no such locks.
     """
-    if sys.platform == "win32":
-        raise OSError("no locks")
-    import fcntl
-
-    descriptor = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o600)
+    descriptor = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600)
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
+        if sys.platform == "win32":
+            import msvcrt
+
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (BlockingIOError, PermissionError):  # the latter on Windows
         os.close(descriptor)
         return None
     except OSError:
@@ -159,7 +165,7 @@ def move_whole(place: Path, path: Path) -> None:
     """
     for written in (place, *place.rglob("*")) if place.is_dir() else (place,):
         _sync(written)
-    if place.is_dir() and path.is_dir() and any(path.iterdir()):
+    if place.is_dir() and path.is_dir():
         _swap(place, path)
     else:
         os.replace(place, path)  # noqa: PTH105 - the replacement must be atomic
@@ -167,7 +173,7 @@ def move_whole(place: Path, path: Path) -> None:
 
 
 def _swap(place: Path, path: Path) -> None:
-    """Replace a folder that is not empty, in two steps; after a crash between them the old one is in a folder that is kept."""
+    """Replace a folder in two steps; after a crash between them the old one is in a folder that is kept."""
     aside = Hidden(path)
     try:
         aside.keep(paths=[path.name])

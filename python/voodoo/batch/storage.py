@@ -15,9 +15,9 @@ from urllib.parse import quote, unquote
 
 from voodoo.errors import RecordingError, VoodooError, a_path, reading
 from voodoo.evaluation.search import find_recordings
+from voodoo.recordings.loaders import SUFFIXES
 from voodoo.whole import appearing_whole
 
-_FILES = (".bag", ".mcap", ".db3", ".zip", ".trc", ".c3d")
 _OF_A_FOLDER = re.compile(r"(metadata\.yaml|Calib[^/]*\.toml|calibration\.toml|bag/[^/]*)$")
 """Files that identify a folder as a recording."""
 _TABLE = "part-0.parquet"
@@ -100,7 +100,7 @@ def _in_folder(files: Any, folder: str) -> list[str]:  # noqa: ANN401 - fsspec h
         whole = f"{folder}/{name}"
         if files.isdir(whole):
             inside += _in_folder(files, whole)
-        elif name.endswith((*_FILES, "_depth.mat")):
+        elif name.lower().endswith(SUFFIXES):
             inside.append(whole)
     return inside
 
@@ -128,8 +128,9 @@ def on_disk(source: str) -> Iterator[Path]:
 
 def name_of(source: str) -> str:
     """Name of a recording: that of its file or folder, without suffix."""
-    name = source.rstrip("/").rsplit("/", 1)[-1]
-    return re.sub(r"(_depth\.mat|\.mcap|\.db3|\.bag|\.zip|\.trc|\.c3d)$", "", name) or "recording"
+    name = local_path(source).name if is_local(source) else source.rstrip("/").rsplit("/", 1)[-1]
+    end = next((suffix for suffix in SUFFIXES if name.lower().endswith(suffix)), "")
+    return name[: len(name) - len(end)] or "recording"
 
 
 def named(sources: Sequence[str], taken: dict[str, str]) -> list[tuple[str, str]]:

@@ -64,5 +64,5 @@ def body_command(
     if file is not None:
         body = Body.load(file)
     else:
-        body = Body.human(1.75 if height is None else height, model=model or "full")
+        body = Body.human(1.75 if height is None else height, model=model or "measured")
     typer.echo(body.to_toml(), nl=False)

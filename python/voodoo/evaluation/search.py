@@ -7,10 +7,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from voodoo.errors import RecordingError, VoodooError
-from voodoo.recordings.loaders import guess_loader
+from voodoo.recordings.loaders import SUFFIXES, guess_loader
 from voodoo.recordings.order import natural
-
-_RECORDING_SUFFIXES = (".bag", ".mcap", ".db3", ".zip")
 
 
 def find_recordings(paths: Sequence[Path], *, only: Sequence[str] = ()) -> list[Path]:
@@ -40,7 +38,7 @@ def find_recordings(paths: Sequence[Path], *, only: Sequence[str] = ()) -> list[
 def _search(folder: Path) -> Iterator[Path]:
     if folder.is_dir():
         for path in sorted(folder.iterdir(), key=lambda path: natural(path.name)):
-            if path.is_dir() or path.name.endswith("_depth.mat") or path.suffix in _RECORDING_SUFFIXES:
+            if path.is_dir() or path.name.lower().endswith(SUFFIXES):
                 yield from [path] if _is_recording(path) else _search(path)
 
 

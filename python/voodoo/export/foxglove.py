@@ -10,7 +10,7 @@ from types import ModuleType
 from typing import Any
 
 import voodoo._core as _core
-from voodoo.errors import installed
+from voodoo.errors import VoodooError, installed
 from voodoo.export.conventions import JOINT_COLOR, limb_color
 from voodoo.export.human_frames import placed_names
 from voodoo.export.layout import FoxgloveAbout, rows_of
@@ -120,10 +120,18 @@ class Channels:
 
 
 def _timestamp(seconds: int, nanoseconds: int) -> bytes:
-    """Fields of google.protobuf.Timestamp, always of the same length: seven bits a byte, the highest says that more follow."""
+    """Fields of google.protobuf.Timestamp, always of the same length: seven bits a byte, the highest says that more follow.
+
+    Raises:
+        VoodooError: a time before zero, or too large.
+    """
     s, n = seconds, nanoseconds
     first = 0x08, s & 127 | 128, s >> 7 & 127 | 128, s >> 14 & 127 | 128, s >> 21 & 127 | 128, s >> 28
-    return bytes((*first, 0x10, n & 127 | 128, n >> 7 & 127 | 128, n >> 14 & 127 | 128, n >> 21 & 127 | 128, n >> 28))
+    fields = (*first, 0x10, n & 127 | 128, n >> 7 & 127 | 128, n >> 14 & 127 | 128, n >> 21 & 127 | 128, n >> 28)
+    try:
+        return bytes(fields)
+    except ValueError:
+        raise VoodooError(f"stamps: expected none before zero and none that are no times, found {seconds} s") from None
 
 
 def _xyz(values: Iterable[float], names: str = "xyz") -> dict[str, float]:
@@ -145,7 +153,7 @@ def write_foxglove(
         turn: see `write_bag`.
 
     Raises:
-        VoodooError: foxglove-sdk is not installed, or a track without limb poses or of another body.
+        VoodooError: foxglove-sdk is not installed, a stamp before zero, or a track without limb poses or of another body.
         OSError: the file cannot be written.
     """
     foxglove = library(path)

@@ -7,6 +7,7 @@ OpenSense reads them (.sto): a frame without a pose has no row there, and times 
 
 from __future__ import annotations
 
+import struct
 import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -138,7 +139,7 @@ def write_c3d(path: str | Path, track: Track) -> None:
         track: with at least one frame, in a frame whose z points up.
 
     Raises:
-        VoodooError: stamps that do not increase.
+        VoodooError: stamps that do not increase, or more joints and sites than the format can hold.
         OSError: the file cannot be written.
     """
     import c3d
@@ -154,7 +155,13 @@ def write_c3d(path: str | Path, track: Track) -> None:
         writer.add_frames((frame, nothing))
     with appearing_whole(Path(path)) as place, place.open("wb") as file, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the library, where there are no forces
-        writer.write(file)
+        try:
+            writer.write(file)
+        except struct.error as error:
+            count = len(track.joint_names)
+            raise VoodooError(
+                f"{path}: expected joints and sites as a .c3d can hold, found {count}: {error}"
+            ) from error
 
 
 def write_mot(path: str | Path, track: Track, body: Body) -> None:

@@ -56,12 +56,21 @@ class PeopleTrack:
         return cls(np.array([estimate.stamp for estimate in estimates], dtype=np.float64), tracks)
 
     def unbroken(self, person: int, *, to_the_end: bool = False) -> Track:
-        """The track of a person from their first to their last frame (or the recording's); `searching` while absent."""
+        """The track of a person from their first to their last frame (or the recording's); `searching` while absent.
+
+        Raises:
+            VoodooError: the person has two rows with one stamp, or one with a stamp of no frame.
+        """
         track = self.tracks[person]
         if len(track) == len(self):
             return track
-        place = np.searchsorted(self.stamps, track.stamps)
-        first, end = int(place[0]), len(self) if to_the_end else int(place[-1]) + 1
+        number_at = dict(zip(self.stamps[::-1].tolist(), range(len(self) - 1, -1, -1), strict=True))
+        place = np.array([number_at.get(stamp, -1) for stamp in track.stamps.tolist()])
+        if place.min() < 0 or len(np.unique(place)) < len(place):
+            raise VoodooError(
+                f"person {person}: expected one row for a frame, found stamps of no frame, or twice the same"
+            )
+        first, end = int(place.min()), len(self) if to_the_end else int(place.max()) + 1
         rows = np.full(end - first, -1)
         rows[place - first] = np.arange(len(track))
         away, wide = rows < 0, track.of_frames(rows)

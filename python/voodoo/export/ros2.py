@@ -210,7 +210,8 @@ class _Human:
             layout, rows = rows_of(track.of_frames(self._displayed), body)
             frames, *_, angles, sure, _ = layout.parts(rows)
             self._joints, self._frames = layout.angles, placed_names(*layout.shapes[:2], person, self.root)
-            self._rows = zip(angles, frames, sure, strict=True)
+            shown = zip(angles, frames, sure, strict=True)
+            self._rows = dict(zip(np.flatnonzero(self._displayed).tolist(), shown, strict=True))
 
     def kinds(self) -> dict[str, str]:
         """Topics and types of the messages, without /tf."""
@@ -219,13 +220,13 @@ class _Human:
         return kinds | {f"{self.topic}/markers": "visualization_msgs/msg/MarkerArray"}
 
     def messages(self, index: int) -> dict[str, Any]:
-        """Topic -> message of a frame; frames are asked for in order."""
+        """Topic -> message of a frame."""
         at = float(self.track.stamps[index])
         header = header_at(at, self.root)
         messages: dict[str, Any] = {}
         drawn = [new(_MARKER, header=header, action=_DELETE_ALL)]
         if self._displayed[index]:
-            angles, rows, sure = next(self._rows)
+            angles, rows, sure = self._rows[index]
             placed = [(parent, name, row) for (parent, name), row in zip(self._frames, rows.tolist(), strict=True)]
             messages["/tf"] = transforms_message(at, [*self._above, *placed])
             messages[f"{self.topic}/joint_states"] = joint_message(at, self.person, self._joints, angles)

@@ -31,12 +31,13 @@ from voodoo.names import SEARCHING
 from voodoo.people import ONE, PeopleEstimate, everybody
 from voodoo.stored import MOST_METADATA, read_stored_text
 from voodoo.unpacking import stored_arrays
-from voodoo.whole import KEPT, SUFFIX, Hidden, locked, move_whole, naming, removed
+from voodoo.whole import KEPT, SUFFIX, Hidden, locked, move_whole, naming, removed, write_whole
 
 _BODIES_S = 10.0
 """Time between two copies of the bodies, which take long to write [s]."""
 _SAMPLED = 3
 """Number of parts in a sample."""
+_PART = "poses that were tracked"
 
 
 class Spool(AbstractContextManager["Spool"]):
@@ -151,7 +152,8 @@ class Spool(AbstractContextManager["Spool"]):
     ) -> tuple[list[Path], list[Exception]]:
         """Write the outputs, whatever becomes of each; returns the files, and what failed.
 
-        The folder is removed when all of them are complete; it is kept for those that a disk has no place for.
+        The folder is removed when all of them are complete. It is kept for those that failed, and for NAME.npz instead of those
+        whose format cannot hold the poses.
 
         Args:
             turn: how outputs are turned upright; None: by the axes of the root frame if that is an optical frame.
@@ -170,7 +172,7 @@ class Spool(AbstractContextManager["Spool"]):
         how |= {"numbered": self._numbered, "left_out": left_out or {}}
         done, errors = written(self.paths, lambda path: _write(path, contents, **how))
         failed = list(errors.values())
-        failing = [path for path in self._kept_for if isinstance(errors.get(path), OSError)]
+        failing = [_later(path, errors[path]) for path in self._kept_for if path in errors]
         if not failing:
             self._hidden.remove()
             return done, failed
@@ -210,9 +212,14 @@ class Spool(AbstractContextManager["Spool"]):
         return f"the poses are kept in {self._hidden.folder}; voodoo recover makes the files"
 
 
+def _later(path: Path, error: Exception) -> Path:
+    """What `recover` makes of poses for an output that failed: of those that its format cannot hold, arrays."""
+    return path if isinstance(error, OSError) or is_table(path) else path.with_name(f"{path.name}.npz")
+
+
 def _stored(paths: Sequence[Path]) -> Iterator[Arrays]:
     for path in paths:
-        with stored_arrays(path, "poses that were tracked") as content:
+        with stored_arrays(path, _PART) as content:
             yield content
 
 
@@ -255,7 +262,8 @@ def _sample(contents: Iterator[Arrays], count: int) -> list[Track]:
 def recover(folder: str | Path, *, taken: Iterable[Path] = ()) -> tuple[list[Path], list[Exception]]:
     """Make the outputs of sessions that were killed, from what they left in a folder; returns the files, and what failed.
 
-    They are written into that folder, under another name if there is one in the place: NAME.recovered.csv.
+    They are written into that folder, under another name if there is one in the place: NAME.recovered.csv. What cannot be
+    recovered stays.
 
     Args:
         folder: of the outputs.
@@ -265,20 +273,28 @@ def recover(folder: str | Path, *, taken: Iterable[Path] = ()) -> tuple[list[Pat
     failed: list[Exception] = []
     others = {path.resolve() for path in taken}
     for hidden in sorted(a_path(folder, error=VoodooError).glob(f".*{SUFFIX}")):
-        if not (hidden / KEPT).is_file() or hidden.stat().st_uid != getattr(os, "geteuid", lambda: 0)():
-            continue
         try:
-            if (lock := locked(hidden)) is not None:
-                try:
-                    _recover_one(hidden, others, done, failed)
-                finally:
+            if hidden.stat().st_uid != getattr(os, "geteuid", lambda: 0)() or not (hidden / KEPT).is_file():
+                continue
+            if (lock := locked(hidden)) is None:
+                continue
+            whole = False
+            try:
+                whole = _recover_one(hidden, others, done, failed)
+            finally:
+                if whole:
+                    removed(hidden, lock)
+                else:
                     os.close(lock)
         except (VoodooError, OSError) as error:
             failed.append(error)
+        except Exception as error:  # damage, or a note of another version
+            failed.append(VoodooError(f"{hidden}: expected what a session left, found {reason(error)}"))
     return done, failed
 
 
-def _recover_one(hidden: Path, taken: set[Path], done: list[Path], failed: list[Exception]) -> None:
+def _recover_one(hidden: Path, taken: set[Path], done: list[Path], failed: list[Exception]) -> bool:
+    """Make the outputs of a session; returns whether nothing of it is left to be made."""
     with reading(hidden / KEPT, "what a session left", error=VoodooError):
         note = json.loads(read_stored_text(hidden / KEPT, "what a session left", most=MOST_METADATA))
         free = {Path(str(name)).name: _free(hidden.parent / Path(str(name)).name, taken) for name in note["paths"]}
@@ -291,33 +307,38 @@ def _recover_one(hidden: Path, taken: set[Path], done: list[Path], failed: list[
             elif left.exists():
                 move_whole(left, path)
             done += [path] if path.exists() else []
-        removed(hidden)
-        return
+        return True
     bodies: dict[int, Body] = {}
     parts: list[Path] = []
     for path in sorted(hidden.glob("*.npz")):
         try:
-            for part in _stored([path]):
+            with stored_arrays(path, _PART) as part:
                 content = dict(part)
                 texts = content.get(BODIES, np.empty(0)).tolist()
                 bodies.update(zip(content[BODY_OF].tolist() if texts else [], map(Body.from_toml, texts), strict=True))
             parts.append(path)
         except VoodooError as error:
             failed.append(error)  # the others can be used
-    root, upright = str(note["root_frame"]), bool(note["upright"])
-    if note["turn"] is not None:
+    if not parts:
+        raise VoodooError(f"{hidden}: expected {_PART}, found none that can be read")
+    root, optical, upright = str(note["root_frame"]), note.get("optical"), bool(note.get("upright"))
+    if note.get("turn") is not None:
         turn = Turn(np.array(note["turn"]["pose"]), str(note["turn"]["words"]))
-    elif upright and parts:  # the floor is not known here
-        turn = by_feet(_sample(_stored(parts), len(parts)), root, optical=note["optical"])
+    elif upright:  # the floor is not known here
+        turn = by_feet(_sample(_stored(parts), len(parts)), root, optical=optical)
     else:
-        turn = by_axes(root, optical=note["optical"])
+        turn = by_axes(root, optical=optical)
     how: Any = {"numbered": bool(note.get("numbered")), "root_frame": root, "turn": turn, "upright": upright}
     how |= {"bodies": bodies, "left_out": {}}
     some, errors = written(free.values(), lambda path: _write(path, lambda: _stored(parts), **how))
     done += some
     failed += errors.values()
-    if not errors:
-        removed(hidden)
+    if errors:
+        note["paths"] = [
+            _later(hidden.parent / name, errors[path]).name for name, path in free.items() if path in errors
+        ]
+        write_whole(hidden / KEPT, json.dumps(note))
+    return not errors
 
 
 def _free(path: Path, taken: set[Path]) -> Path:

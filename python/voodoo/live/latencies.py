@@ -33,7 +33,7 @@ class Latencies:
         self._counts[at] += 1
 
     def percentile(self, percent: float) -> float:
-        """Percentile of the latencies [s] to 1 %, with `fraction` in percent (0 to 100); NaN without any."""
+        """Percentile of the latencies [s] to 1 %, for `percent` from 0 to 100; NaN without any."""
         if not self.count:
             return math.nan
         at = int(np.searchsorted(np.cumsum(self._counts), max(math.ceil(self.count * percent / 100.0), 1)))

@@ -215,9 +215,10 @@ class Live:
         try:
             source.open(self.clock, self.faults)
         except SourceGone as error:
-            source.close()
             if not source.stays:
+                self.close()
                 raise
+            source.close()
             self.faults.log(f"{source.name}: waiting for it: {error}")
             return False
         except BaseException:

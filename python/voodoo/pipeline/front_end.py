@@ -129,7 +129,7 @@ class FrontEnd(Generic[E]):
             BodyError: a given first pose names a site that the body does not have.
             RecordingError: an image cannot be decoded.
 
-        After an error, tracker and front end are unchanged.
+        After an error, tracker and front end are unchanged, except that the finders of `starts` may have seen the frame.
         """
         before = self._state()
         try:

@@ -261,12 +261,15 @@ def pose_as_init(estimate: Estimate, body: Body) -> Init:
 
 
 def stature(body: Body) -> float | None:
-    """Stature [m] of a body with the limbs of the default human; None for other bodies."""
-    for model in get_args(HumanModel):
-        human = Body.human(model=model)
-        if human.limb_names == body.limb_names:
-            return round(_DEFAULT_M * _upright(body) / _upright(human), 3)
-    return None
+    """Stature [m] of a body with the limbs of a human; None for other bodies."""
+    humans = [
+        human for model in get_args(HumanModel) if (human := Body.human(model=model)).limb_names == body.limb_names
+    ]
+    if not humans:
+        return None
+    turns = body.core.at_rest()[0]  # models with the same limbs differ in these, which sizes hardly change
+    human = min(humans, key=lambda one: float(np.abs(one.core.at_rest()[0] - turns).sum()))
+    return round(_DEFAULT_M * _upright(body) / _upright(human), 3)
 
 
 def _upright(body: Body) -> float:

@@ -42,9 +42,9 @@ def bag_file(path: Path, unpacking: Unpacking) -> BagFile:
     """
     if path.is_dir():
         return BagFolder(path, unpacking)
-    if path.suffix == ".mcap":
+    if path.suffix.lower() == ".mcap":
         return McapFile(path, unpacking)
-    if path.suffix == ".db3":
+    if path.suffix.lower() == ".db3":
         return SqliteFile(path)
     check_stored(path, "a complete ROS bag", most=MOST_RECORDED)
     return Ros1File(path, unpacking)

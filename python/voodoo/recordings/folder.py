@@ -14,6 +14,7 @@ import numpy as np
 from voodoo.errors import RecordingError
 from voodoo.measurements import ByteImage, ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.recordings.camera_files import FolderCalibration, PlacedCamera, read_calibration
+from voodoo.recordings.empty_scene import PICTURES
 from voodoo.recordings.left_out import LeftOut, leave_out
 from voodoo.recordings.order import numbers_of
 from voodoo.recordings.pictures import decode_color, decode_depth_png
@@ -30,7 +31,6 @@ _MOST_NUMBERED = 1_000_000
 _CLOCKS = {13: 1e-3, 16: 1e-6, 19: 1e-9}
 """Number of digits of a time since 1970 -> its unit in seconds."""
 DEPTH_SUFFIXES = (".png", ".pgm")
-_PICTURES = (".png", ".jpg", ".jpeg")
 
 
 class FolderRecording(Recording):
@@ -113,7 +113,7 @@ class FolderRecording(Recording):
             if self._calibration.color is None:
                 self._unused = (("rgb", "no [color] table in the calibration file"),)
             else:
-                self._color = _listing(path, "rgb", _PICTURES, clock, left_out, set_back)
+                self._color = _listing(path, "rgb", PICTURES, clock, left_out, set_back)
         self.assumed = (*clock.notes, *set_back.words)
 
     def __iter__(self) -> Iterator[RecordedFrame]:

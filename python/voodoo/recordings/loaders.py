@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from voodoo.errors import RecordingError, a_path
+from voodoo.names import ROS1_SUFFIXES, ROS2_SUFFIXES
 from voodoo.stored import MOST_RECORDED, check_stored
 
 if TYPE_CHECKING:
@@ -25,11 +26,13 @@ class Loader:
         module: module of this package; it is imported when it is needed, because it needs libraries that others do not.
         name: name of the opener in it.
         expects: description of the files.
+        suffixes: ends of their names, in lower case; () for folders.
     """
 
     module: str
     name: str
     expects: str
+    suffixes: tuple[str, ...] = ()
 
     @property
     def open(self) -> Callable[..., Recording]:
@@ -40,10 +43,13 @@ class Loader:
 
 LOADERS: dict[str, Loader] = {
     "ros2": Loader(
-        "ros", "RosRecording", "a ROS 2 bag: folder with metadata.yaml or bag/, .mcap or .db3, or a .zip of it"
+        "ros",
+        "RosRecording",
+        "a ROS 2 bag: folder with metadata.yaml or bag/, .mcap or .db3, or a .zip of it",
+        ROS2_SUFFIXES,
     ),
-    "ros1": Loader("ros", "RosRecording", "a ROS 1 .bag, or a .zip of it"),
-    "utd-mhad": Loader("utd_mhad", "UtdMhadRecording", "a *_depth.mat of UTD-MHAD"),
+    "ros1": Loader("ros", "RosRecording", "a ROS 1 .bag, or a .zip of it", ROS1_SUFFIXES),
+    "utd-mhad": Loader("utd_mhad", "UtdMhadRecording", "a *_depth.mat of UTD-MHAD", ("_depth.mat",)),
     "folder": Loader(
         "folder",
         "FolderRecording",
@@ -53,9 +59,13 @@ LOADERS: dict[str, Loader] = {
     "videos": Loader(
         "videos", "VideosRecording", "a folder with Calib*.toml and videos/* or images/*/ of several cameras"
     ),
-    "azure-kinect": Loader("azure_kinect", "AzureKinectRecording", "a .mkv of an Azure Kinect or Femto Bolt"),
-    "markers": Loader("marker_files", "MarkerRecording", "a .trc or .c3d file of markers"),
+    "azure-kinect": Loader(
+        "azure_kinect", "AzureKinectRecording", "a .mkv of an Azure Kinect or Femto Bolt", (".mkv",)
+    ),
+    "markers": Loader("marker_files", "MarkerRecording", "a .trc or .c3d file of markers", (".trc", ".c3d")),
 }
+SUFFIXES = (".zip", *(suffix for loader in LOADERS.values() for suffix in loader.suffixes))
+"""Ends of the names of files that are recordings, in lower case."""
 
 
 _FILM = ("a film", "depth, or a folder with the films of several cameras and their calibration, Calib*.toml")
@@ -130,17 +140,11 @@ def guess_loader(path: Path) -> str:
     if path.exists() and not path.is_dir():
         check_stored(path, "a recording", most=MOST_RECORDED)
     if path.is_file():
-        if path.name.endswith("_depth.mat"):
-            return "utd-mhad"
-        if path.suffix.lower() == ".mkv":
-            return "azure-kinect"
-        if path.suffix.lower() in (".trc", ".c3d"):
-            return "markers"
-        names = zip_members(path) if path.suffix == ".zip" else [path.name]
-        if any(name.endswith(".bag") for name in names):
-            return "ros1"
-        if any(name.endswith((".mcap", ".db3")) for name in names):
-            return "ros2"
+        zipped = path.suffix.lower() == ".zip"
+        names = zip_members(path) if zipped else [path.name]
+        for kind in ("ros1", "ros2") if zipped else LOADERS:
+            if any(name.lower().endswith(LOADERS[kind].suffixes) for name in names):
+                return kind
     else:
         if any(path.glob("Calib*.toml")):
             return _of_cameras(path) or "pose2sim"
@@ -157,7 +161,7 @@ def guess_loader(path: Path) -> str:
         if any(path.glob("*.png")) or any(path.glob("*.pgm")):
             return "folder"
         try:
-            return "ros1" if find_bag(path).suffix == ".bag" else "ros2"
+            return "ros1" if find_bag(path).suffix.lower() in ROS1_SUFFIXES else "ros2"
         except RecordingError as error:
             raise RecordingError(f"{error}; {_listing()}") from error
     advice = _ADVICE.get(path.suffix.lower())

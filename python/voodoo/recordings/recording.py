@@ -275,7 +275,7 @@ def usable(make: Callable[[], M], number: int, where: object, left_out: LeftOut 
     return None
 
 
-def number_option(path: Path, name: str, value: object, expected: str, *, most: float, zero: bool = False) -> float:
+def number_option(path: object, name: str, value: object, expected: str, *, most: float, zero: bool = False) -> float:
     """Check a number given to a loader: above zero (or zero, if allowed) and not above `most`.
 
     Raises:

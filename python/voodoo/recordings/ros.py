@@ -17,7 +17,7 @@ from voodoo.recordings.left_out import LeftOut, leave_out, leaving_out
 from voodoo.recordings.recording import Recording, SensorInfo, mean_rate, number_option, usable
 from voodoo.recordings.ros_bag import Bag
 from voodoo.recordings.ros_messages import Message, camera_of, measured, stamp_of
-from voodoo.recordings.ros_topics import TopicChoice, TopicFinder, TopicSource
+from voodoo.recordings.ros_topics import TopicChoice, TopicFinder, TopicSource, checked_numbers
 from voodoo.recordings.set_back import SetBack, out_of_order
 from voodoo.recordings.together import in_turn, together
 from voodoo.recordings.transforms import TransformTree, matrix
@@ -87,9 +87,8 @@ class RosRecording(Recording):
         if isinstance(use, str) or not use or not set(use) <= set(TOPIC_KINDS):
             raise RecordingError(f"use: expected a tuple of some of {', '.join(TOPIC_KINDS)}, found {use!r}")
         self.path = path
-        scale = _MILLIMETER if meters_per_unit is None else meters_per_unit
-        scale = number_option(path, "meters_per_unit", scale, "a length > 0", most=1e3)
-        max_age = number_option(path, "tf_max_age", tf_max_age, "seconds >= 0", most=math.inf, zero=True)
+        unit, max_age = checked_numbers(path, meters_per_unit, tf_max_age)
+        scale = _MILLIMETER if unit is None else unit
         self._left_out = left_out
         if unpacked_gb is not None:
             unpacked_gb = number_option(path, "unpacked_gb", unpacked_gb, "gigabytes > 0", most=1e6)
@@ -111,7 +110,7 @@ class RosRecording(Recording):
         if self.complete:
             self._check_together(sources)
 
-        place = path if path.suffix == ".zip" else self._bag.file
+        place = path if path.suffix.lower() == ".zip" else self._bag.file
         self.name = next(part for part in (place.stem, *(p.name for p in place.resolve().parents)) if part != "bag")
         if not bare:
             find, first = partial(find_beside, place), self._driver.first_stamp

@@ -20,6 +20,7 @@ from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_
 from rosbags.typesys.store import Typestore
 
 from voodoo.errors import RecordingError, reading
+from voodoo.names import ROS1_SUFFIXES, ROS2_SUFFIXES
 from voodoo.recordings import realsense
 from voodoo.recordings.bag_files import BagFile, BagFolder, bag_file
 from voodoo.recordings.left_out import LeftOut, leave_out
@@ -99,7 +100,7 @@ class MessageTypes:
         return read(data, kind)
 
 
-_BAG_SUFFIXES = (".bag", ".mcap", ".db3")
+_SUFFIXES = (*ROS1_SUFFIXES, *ROS2_SUFFIXES)
 _ADVICE = "; --option unpacked_gb=N allows N gigabytes"
 
 
@@ -131,14 +132,14 @@ class Bag:
         self._left_out, self._unpacked = left_out, unpacked
         self._reader: BagFile | None = None
         folder = path
-        if path.suffix == ".zip":
+        if path.suffix.lower() == ".zip":
             self._unpacked_to = tempfile.TemporaryDirectory(prefix="voodoo-", ignore_cleanup_errors=True)
             folder = Path(self._unpacked_to.name)
             _unpack(path, folder, unpacked)
         self._folder = folder
         with self._naming():
             self.file = find_bag(folder) if folder.is_dir() else folder
-        self.is_ros2: bool = self.file.suffix != ".bag"
+        self.is_ros2: bool = self.file.suffix.lower() not in ROS1_SUFFIXES
         self._types = MessageTypes(is_ros2=self.is_ros2)
         with self._open() as reader:
             with reading(self.path, "the index of a ROS bag"):
@@ -245,7 +246,7 @@ class Bag:
     def _check_metadata(self, reader: BagFolder) -> None:
         """Compare metadata.yaml with the storage files: topics in only one of them would be left out silently."""
         listed = {storage.path.name for storage in reader.storages}  # type: ignore[attr-defined]
-        beside = sorted(part.name for part in self.file.iterdir() if part.suffix in (".mcap", ".db3"))
+        beside = sorted(part.name for part in self.file.iterdir() if part.suffix.lower() in ROS2_SUFFIXES)
         if any(name not in listed for name in beside):
             raise RecordingError(
                 f"{self.file / 'metadata.yaml'}: expected all of {', '.join(beside)}, found {', '.join(sorted(listed))} "
@@ -350,7 +351,7 @@ def find_bag(folder: Path) -> Path:
             return candidate
     for candidate in (folder, folder / "bag"):
         if candidate.is_dir():
-            files = sorted(item for item in candidate.iterdir() if item.suffix in _BAG_SUFFIXES and item.is_file())
+            files = sorted(item for item in candidate.iterdir() if item.suffix.lower() in _SUFFIXES and item.is_file())
             if len(files) == 1:
                 return files[0]
             if files:
@@ -360,8 +361,8 @@ def find_bag(folder: Path) -> Path:
 
 
 def _is_of_bag(name: str) -> bool:
-    parts = (suffix + more for suffix in _BAG_SUFFIXES for more in ("", ".zstd", "-wal", "-journal"))
-    return name == "metadata.yaml" or name.endswith(tuple(parts))
+    parts = (suffix + more for suffix in _SUFFIXES for more in ("", ".zstd", "-wal", "-journal"))
+    return name == "metadata.yaml" or name.lower().endswith(tuple(parts))
 
 
 def zip_members(path: Path) -> list[str]:

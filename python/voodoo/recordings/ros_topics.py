@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -11,6 +12,7 @@ from voodoo.model.camera import Camera
 from voodoo.names import TOPIC_KINDS, TopicKind
 from voodoo.recordings import realsense
 from voodoo.recordings.order import natural
+from voodoo.recordings.recording import number_option
 from voodoo.recordings.ros_bag import Bag
 from voodoo.recordings.ros_messages import (
     DEPTH_ENCODINGS,
@@ -53,6 +55,17 @@ class TopicSource:
 def info_topic(topic: str) -> str:
     """Topic of the calibration of an image topic: its name with the last part replaced."""
     return f"{base_topic(topic).rsplit('/', 1)[0]}/camera_info"
+
+
+def checked_numbers(where: object, meters_per_unit: float | None, tf_max_age: float) -> tuple[float | None, float]:
+    """The numbers given for topics: meters per unit of depth, None if not given, and the largest age of a transform [s].
+
+    Raises:
+        RecordingError: one is out of range; `where` begins the message.
+    """
+    if meters_per_unit is not None:
+        meters_per_unit = number_option(where, "meters_per_unit", meters_per_unit, "a length > 0", most=1e3)
+    return meters_per_unit, number_option(where, "tf_max_age", tf_max_age, "seconds >= 0", most=math.inf, zero=True)
 
 
 class TopicFinder:

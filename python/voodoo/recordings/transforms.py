@@ -63,7 +63,10 @@ class _Edge:
         low, high = bisect_left(self.stamps, since), bisect_right(self.stamps, until)
         # The newest transform is kept even if it is too old, because errors name its age.
         low = min(low, max(len(self.stamps) - 1, 0))
+        held = self.transforms[:1] if self.constant else []
         self.stamps, self.transforms = self.stamps[low:high], self.transforms[low:high]
+        if held and not self.stamps:  # it is valid at all times
+            self.stamps, self.transforms = [until], held
 
     def moves(self) -> bool:
         """Whether a transform differs from the first one by more than the drift of odometry."""
@@ -123,9 +126,9 @@ class TransformTree:
         beside[child][0].add(stamp, transform, static=static)
 
     def keep(self, since: float, until: float) -> None:
-        """Discard changing transforms outside these stamps [s], to limit the memory of a live source."""
+        """Discard transforms outside these stamps [s], to limit the memory of a live source; of a constant one the last stays."""
         for edge, is_own in (one for others in self._neighbors.values() for one in others.values()):
-            if is_own and not edge.constant:
+            if is_own:
                 edge.keep(since, until)
 
     def covers(self, root: str, frame: str, stamp: float) -> bool:

@@ -93,7 +93,7 @@ def _field(node: Any) -> Any:  # noqa: ANN401
     return bool if name == "bool" else getattr(types, "uint8" if name in _BYTES else name)
 
 
-_LOOPBACK = """<General><Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces>
+_LOOPBACK = """<General><Interfaces><NetworkInterface address="127.0.0.1" multicast="false"/></Interfaces>
 <AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>
 <MaxAutoParticipantIndex>60</MaxAutoParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers></Discovery>"""
 _SETTINGS = """<CycloneDDS><Domain>{}<Internal><SocketReceiveBufferSize min="default"/>

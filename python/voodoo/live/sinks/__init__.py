@@ -41,6 +41,7 @@ def parts_of(address: str, *, host: str | None, port: int) -> tuple[str, int, Sp
     try:
         parts = urlsplit(address)
         found, number = parts.hostname or host, port if parts.port is None else parts.port
+        (found or "").encode("idna")  # as it will be looked up
     except ValueError as error:
         raise VoodooError(f"{address}: expected SCHEME://HOST:PORT, found: {error}") from None
     if not found or parts.path.strip("/") or " " in address:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import voodoo._core as _core
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, reading
 from voodoo.export import ros2
 from voodoo.export.human_frames import placed_names
 from voodoo.export.layout import Layout
@@ -22,6 +22,7 @@ from voodoo.live.session import Output
 from voodoo.live.sinks.people import posed_people
 from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.model.body import Body
+from voodoo.people import FORGET_AFTER_S
 from voodoo.pipeline.front_end import nobody
 
 ADDRESS = "ros2://"
@@ -69,11 +70,12 @@ class Ros2Sink(Output):
             raise VoodooError(
                 f"{address}: expected {ADDRESS} without a host, found one; ROS_DOMAIN_ID chooses the network"
             )
-        self._root = root_frame
+        self._root, self._on_message = root_frame, on_message
         self._node = Node(quiet=True) if node is None else node
         self._topics: dict[str, Publication] = {}
         self._displayed: dict[int, Body] = {}
         self._described: dict[int, float] = {}
+        self._present: dict[int, float] = {}
         self._requested: dict[int, dict[str, int]] = {}
         self._checked = -np.inf
         self._template_of = lru_cache(8)(self._make_template)
@@ -103,6 +105,7 @@ class Ros2Sink(Output):
         if displayed.keys() != self._requested.keys() or abs(step.stamp - self._checked) > _CHECK_S:
             self._checked = step.stamp
             self._obey()
+            self._drop_who_left(step)
             self._describe(observed)
             self._requested = {number: self._subscribers(number) for number in displayed}
         image = next((item for item in step.frame.measurements if isinstance(item, (DepthImage, ColorImage))), None)
@@ -123,9 +126,26 @@ class Ros2Sink(Output):
         if self._resets.take() and self.on_reset is not None:
             self.on_reset()
         for raw in self._follows.take():
-            chosen: Any = ros2.STORE.deserialize_cdr(raw, _PLACE)
+            try:
+                with reading(FOLLOW, f"a {_PLACE} message", error=VoodooError):
+                    chosen: Any = ros2.STORE.deserialize_cdr(raw, _PLACE)
+            except VoodooError as error:
+                self._on_message(f"{self.name}: {error}")
+                continue
             if self.on_choice is not None:
                 self.on_choice(chosen.header.frame_id, np.array([chosen.point.x, chosen.point.y, chosen.point.z]))
+
+    def _drop_who_left(self, step: Step) -> None:
+        """Withdraw the topics of persons whom the tracker has forgotten: numbers rise as long as the session lasts."""
+        self._present.update(dict.fromkeys(step.estimates, step.stamp))
+        for number in [one for one, at in self._present.items() if abs(step.stamp - at) > FORGET_AFTER_S]:
+            description = f"/human_description_{ros2.person_id(number)}"
+            folders = tuple(f"{above}/{ros2.person_id(number)}/" for above in (ros2.BODIES, ros2.PERSONS))
+            for topic in [one for one in self._topics if one == description or one.startswith(folders)]:
+                del self._topics[topic]
+            del self._present[number]
+            self._described.pop(number, None)
+            self._template_of.cache_clear()
 
     def _describe(self, observed: Mapping[int, Body]) -> None:
         for number, body in observed.items():

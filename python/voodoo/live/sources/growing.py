@@ -12,13 +12,14 @@ from voodoo.errors import RecordingError
 from voodoo.live.clock import Clock
 from voodoo.live.source import Arrival, Faults, Source, SourceGone
 from voodoo.recordings.camera_files import FolderCalibration, read_calibration
+from voodoo.recordings.empty_scene import PICTURES
+from voodoo.recordings.folder import DEPTH_SUFFIXES, color_image, depth_image
 from voodoo.recordings.folder import FrameClock as NameClock
-from voodoo.recordings.folder import color_image, depth_image
 
 _POLL_S = 0.005
 _PATIENCE_S = 0.5
 """An undecodable image is retried for this time, because it may still be being written."""
-_SUFFIXES = {"depth": (".png",), "rgb": (".png", ".jpg", ".jpeg")}
+_SUFFIXES = {"depth": DEPTH_SUFFIXES, "rgb": PICTURES}
 
 
 class GrowingSource(Source):

@@ -14,7 +14,7 @@ from voodoo.live.ros2.dds import Node, Offer, Subscription
 from voodoo.live.ros2.feed import TF, RosFeed
 from voodoo.live.source import Arrival, Faults, Source, SourceGone
 from voodoo.recordings.camera_files import read_calibration
-from voodoo.recordings.ros_topics import CAMERA_INFO, IMAGES, MEASURED, info_topic
+from voodoo.recordings.ros_topics import CAMERA_INFO, IMAGES, MEASURED, checked_numbers, info_topic
 
 _DISCOVERY_S, _LISTEN_S, _POLL_S = 3.0, 2.0, 0.05
 _DEPTH, _TF_DEPTH = 30, 100
@@ -31,7 +31,7 @@ class Ros2Source(RosFeed, Source):
         tf_max_age: largest age of a changing transform [s].
 
     Raises:
-        VoodooError: no topics.
+        VoodooError: no topics, or a number out of range.
     """
 
     def __init__(
@@ -44,11 +44,10 @@ class Ros2Source(RosFeed, Source):
         place = None if calibration is None else read_calibration(calibration)
         pose = None if place is None else (place.root_frame, place.depth.world_from_sensor)
         named = [topic if topic.startswith("/") else f"/{topic}" for topic in topics]
-        super().__init__(
-            named, Faults(), HostClock(), root_frame=root_frame, meters_per_unit=meters_per_unit, tf_max_age=tf_max_age,
-            sensor_pose=pose,
-        )  # fmt: skip
         self.name = f"ros2:{named[0]}"
+        unit, age = checked_numbers(self.name, meters_per_unit, tf_max_age)
+        how: dict[str, Any] = {"meters_per_unit": unit, "tf_max_age": age, "sensor_pose": pose}
+        super().__init__(named, Faults(), HostClock(), root_frame=root_frame, **how)
         self._subscriptions: dict[str, Subscription] = {}
         self._gone = False
 
