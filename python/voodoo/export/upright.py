@@ -10,12 +10,13 @@ import numpy as np
 
 from voodoo.export.table import FloatArray
 from voodoo.export.track import Track
+from voodoo.model.rotations import axes
 from voodoo.model.standing import is_optical, standing_along
 from voodoo.model.transforms import pose_of
 from voodoo.recordings.marker_trajectories import Z_UP_FROM
 from voodoo.sensors.settings import LEVEL_FRAMES
 
-UPRIGHT_FROM_OPTICAL: FloatArray = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+UPRIGHT_FROM_OPTICAL = axes("z -x -y")
 """Rotation from the axes of an optical frame (x right, y down, z forward) to those of REP-103 (x forward, y left, z up)."""
 _HIGH_M = 1.5
 """Feet that are never below this height above z = 0 are not on a floor there; stairs and platforms are lower."""
