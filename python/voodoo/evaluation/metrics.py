@@ -11,6 +11,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from voodoo.measurements import ROUNDED_S
 from voodoo.recordings.keypoint_layouts import LIMBS
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
@@ -33,7 +34,6 @@ BONE_OFF = 0.25
 """Tolerated relative change of the length of a reference's bone: twice the variation of Kinect's skeleton."""
 
 _BONES = tuple(limb for limb in LIMBS if not limb[1].endswith("_hip"))
-_STAMP_TOLERANCE_S = 1e-6
 
 
 def places_of(names: Sequence[str], positions: FloatArray, chosen_names: Sequence[str] = JOINTS) -> FloatArray:
@@ -182,7 +182,7 @@ def lost_frames(far: BoolArray, known: BoolArray, stamps: FloatArray) -> BoolArr
     edges = np.flatnonzero(flags[1:] != flags[:-1])
     for first, end in zip(edges[::2], edges[1::2], strict=True):
         run = observed[first:end]
-        if stamps[run[-1]] - stamps[run[0]] + period > LOST_AFTER_S + _STAMP_TOLERANCE_S:
+        if stamps[run[-1]] - stamps[run[0]] + period > LOST_AFTER_S + ROUNDED_S:
             lost[run] = True
     return lost
 

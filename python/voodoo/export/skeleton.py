@@ -17,6 +17,7 @@ import numpy.typing as npt
 import voodoo._core as _core
 from voodoo.errors import VoodooError
 from voodoo.export.track import Track
+from voodoo.measurements import ASSUMED_RATE_HZ
 from voodoo.model.at_rest import limbs_at_rest
 from voodoo.model.body import Body
 from voodoo.model.rotations import quaternions
@@ -194,7 +195,7 @@ def mean_interval(stamps: FloatArray) -> float:
         VoodooError: stamps that do not rise.
     """
     if len(stamps) < 2:
-        return 1.0 / 30.0
+        return 1.0 / ASSUMED_RATE_HZ
     steps = np.diff(stamps)
     if (steps <= 0.0).any():
         raise VoodooError("stamps: expected rising times, found others")
