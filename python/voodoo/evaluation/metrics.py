@@ -17,8 +17,8 @@ from voodoo.recordings.keypoint_layouts import LIMBS
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 
-_LIMBS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
-JOINTS = tuple(f"{side}_{joint}" for joint in _LIMBS for side in ("l", "r"))
+LIMB_JOINTS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+JOINTS = tuple(f"{side}_{joint}" for joint in LIMB_JOINTS for side in ("l", "r"))
 """The twelve joints that errors are averaged over."""
 
 LOST_AFTER_S = 0.3
@@ -122,7 +122,7 @@ def joint_angles(positions: FloatArray) -> FloatArray:
     down = (at["l_hip"] + at["r_hip"] - at["l_shoulder"] - at["r_shoulder"]) / 2.0
     angles = []
     for side in ("l", "r"):
-        shoulder, elbow, wrist, hip, knee, ankle = (at[f"{side}_{joint}"] for joint in _LIMBS)
+        shoulder, elbow, wrist, hip, knee, ankle = (at[f"{side}_{joint}"] for joint in LIMB_JOINTS)
         angles += [_between(elbow - shoulder, wrist - elbow), _between(knee - hip, ankle - knee)]
         angles += [_between(down, elbow - shoulder), _between(down, knee - hip)]
     return np.column_stack(angles)
