@@ -19,6 +19,8 @@ ASSUMED_RATE_HZ = 30.0
 """Frames per second where none is known, the default of most depth cameras."""
 ROUNDED_S = 1e-6
 """Times that differ by less are the same, one of them rounded or computed."""
+MARKER_SIGMA_M = 0.02
+"""Standard deviation of a marker of which it is not known [m]."""
 _LARGEST = float(np.finfo(np.float64).max)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, FiniteFloat
 
 from voodoo.errors import RecordingError, shortened
-from voodoo.measurements import FloatArray, MarkerSet, RecordedFrame
+from voodoo.measurements import MARKER_SIGMA_M, FloatArray, MarkerSet, RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.joint import Strict, valid
 from voodoo.model.standing import HIGH_M, standing_along
@@ -49,7 +49,7 @@ class MarkerMap(Strict):
     sites: dict[str, str] = Field(default_factory=dict)
     limbs: dict[str, OnLimb] = Field(default_factory=dict)
     y_up: bool | None = None
-    sigma_m: Annotated[FiniteFloat, Field(gt=0.0)] = 0.02
+    sigma_m: Annotated[FiniteFloat, Field(gt=0.0)] = MARKER_SIGMA_M
 
     @classmethod
     def load(cls, path: Path) -> MarkerMap:

@@ -102,9 +102,7 @@ class Context:
 
     def add_rays(self, frame: Frame) -> list[SiteRay]:
         """Add the collected rays to a frame; returns them with the trust by which they agree."""
-        rays, scale = self.rays, self.settings.agreement
-        if scale > 0.0:
-            rays = agreed(rays, predicted=self.predicted, scale=scale)
+        rays = agreed(self.rays, predicted=self.predicted)
         add_rays(frame, rays, model=self.settings.model)
         return rays
 
