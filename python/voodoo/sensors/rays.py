@@ -17,6 +17,8 @@ AGREE_M = 0.08
 """A ray at this distance from a position has a quarter of the weight of a ray through it; networks have errors of 2 to 6 cm."""
 TRUSTED = 0.25
 """A ray with less trust does not support the position."""
+_LEAST_TRUST = 0.05
+"""Rays with less trust are not used."""
 _PARALLEL = 1e-3
 """Rays whose directions differ by less than 2 degrees (sine squared) do not determine a position."""
 
@@ -145,8 +147,8 @@ def met(
     return point, trust_at(point, origins, directions)
 
 
-def add_rays(frame: Frame, rays: Sequence[SiteRay], *, model: SensorModel, min_trust: float = 0.05) -> int:
-    """Add rays with the weights of their standard deviations; rays with a trust below `min_trust` are left out.
+def add_rays(frame: Frame, rays: Sequence[SiteRay], *, model: SensorModel) -> int:
+    """Add rays with the weights of their standard deviations; those that others contradict are left out.
 
     Returns:
         The number of rays added.
@@ -157,5 +159,5 @@ def add_rays(frame: Frame, rays: Sequence[SiteRay], *, model: SensorModel, min_t
     if not rays:
         return 0
     return frame._add_site_rays(
-        rays, reference_sigma=model.reference_sigma, max_weight=model.max_weight, min_trust=min_trust
+        rays, reference_sigma=model.reference_sigma, max_weight=model.max_weight, min_trust=_LEAST_TRUST
     )
