@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
-from voodoo.model.rotations import euler_angles, matrix_of_turn, quaternions, turned_between
+from voodoo.model.rotations import axes, euler_angles, matrix_of_turn, quaternions, turned_between
 
 CHANCE = np.random.default_rng(4)
 MATRICES = np.concatenate(
@@ -17,6 +17,11 @@ MATRICES = np.concatenate(
         np.eye(3)[None],
     ]
 )
+
+
+def test_axes():
+    assert (axes("z -x -y") @ (1.0, 2.0, 3.0)).tolist() == [3.0, -1.0, -2.0]
+    np.testing.assert_array_equal(axes("x y z"), np.eye(3))
 
 
 def test_quaternions():

@@ -171,26 +171,25 @@ def columns_in(header: Sequence[str]) -> str:
     return shortened(", ".join(header) or "none", most=60)
 
 
-def a_path(path: object, *, error: type[VoodooError], name: str = "path") -> Path:
+def a_path(path: object, *, error: type[VoodooError]) -> Path:
     """A path given by the caller, with `~` expanded.
 
     Args:
         path: what was given.
         error: what to raise.
-        name: of the argument.
 
     Raises:
-        VoodooError: of the class `error`: not a path, the home of an unknown user, or a NUL inside; it names the argument.
+        VoodooError: of the class `error`: not a path, the home of an unknown user, or a NUL inside.
     """
     if not isinstance(path, str | PathLike) or not isinstance(fspath(path), str):
-        raise error(f"{name}: expected a file or folder, found {type(path).__name__}")
+        raise error(f"path: expected a file or folder, found {type(path).__name__}")
     text = fspath(path)
     if "\0" in text:
-        raise error(f"{name}: expected a file or folder, found a name with a NUL: {text!r:.80}")
+        raise error(f"path: expected a file or folder, found a name with a NUL: {text!r:.80}")
     try:
         return Path(text).expanduser()
     except RuntimeError:
-        raise error(f"{name}: expected a file or folder, found the home of an unknown user: {text}") from None
+        raise error(f"path: expected a file or folder, found the home of an unknown user: {text}") from None
 
 
 def utf8_name(path: Path, *, error: type[VoodooError] = VoodooError) -> str:

@@ -15,6 +15,12 @@ from voodoo.model.camera import Camera
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 ByteImage: TypeAlias = npt.NDArray[np.uint8]
 DepthArray: TypeAlias = npt.NDArray[np.uint16] | npt.NDArray[np.float32]
+ASSUMED_RATE_HZ = 30.0
+"""Frames per second where none is known, the default of most depth cameras."""
+ROUNDED_S = 1e-6
+"""Times that differ by less are the same, one of them rounded or computed."""
+MARKER_SIGMA_M = 0.02
+"""Standard deviation of a marker of which it is not known [m]."""
 _LARGEST = float(np.finfo(np.float64).max)
 
 

@@ -25,6 +25,7 @@ from voodoo.export.files import check_target, is_table
 from voodoo.export.spool import Spool
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, by_axes, by_feet, by_floor, lying_words
+from voodoo.measurements import ASSUMED_RATE_HZ
 from voodoo.pipeline.floor import visible_floor
 from voodoo.pipeline.run import TrackedFrame
 from voodoo.pipeline.start import AUTO, Beginning, beginning_of, start_people, start_tracker
@@ -259,7 +260,7 @@ def run(
     failures: list[Exception] = []
     chosen = set(np.linspace(0, len(source) - 1, sheet).round().astype(int).tolist())
     rate = source.info().rate_hz
-    writer = None if overlay is None else PictureWriter(overlay, rate_hz=rate if np.isfinite(rate) else 30.0)
+    writer = None if overlay is None else PictureWriter(overlay, rate_hz=rate if np.isfinite(rate) else ASSUMED_RATE_HZ)
     if writer is not None and writer.note:
         print_message(writer.note)
     drawing: list[Overlay] = []

@@ -16,7 +16,7 @@ from voodoo._core import Estimate, SiteRay
 from voodoo.drawing.ink import RAY, SUBPIXEL, Color, Picture, point
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, KeypointImage
 from voodoo.model.body import Body
-from voodoo.model.projection import CameraView, View, limb_silhouette
+from voodoo.model.projection import NEAREST_M, CameraView, View, limb_silhouette
 
 Pictured: TypeAlias = DepthImage | ColorImage | KeypointImage
 """Measurements of a camera."""
@@ -167,7 +167,6 @@ _BODY_POINTS = 400
 _BACKGROUND = (90, 90, 90)
 _DEPTH_STEP = 0.005
 """Depths are rounded to steps of this fraction, below the noise of depth cameras; this halves the size of the images."""
-_NEAREST_M = 0.05
 _POINT_FILL = 0.3
 """Fraction of its pixel that a point of a depth image fills, so that the model is visible between the points."""
 _SILHOUETTE_PX = 0.3
@@ -269,7 +268,7 @@ def grown(image: npt.NDArray[Pixel], step: int, shape: tuple[int, ...]) -> npt.N
 def rounded_millimeters(image: npt.NDArray[Any], meters_per_unit: float) -> npt.NDArray[np.uint16]:
     """Depths [mm] quantized in relative steps, up to 65 m; 0 without a return, or nearer than any camera measures."""
     meters = image.astype(np.float64) * meters_per_unit
-    observed = np.isfinite(meters) & (meters >= _NEAREST_M)
+    observed = np.isfinite(meters) & (meters >= NEAREST_M)
     steps = np.round(np.log(meters, where=observed, out=np.zeros_like(meters)) / _DEPTH_STEP)
     rounded = np.minimum(np.round(1000.0 * np.exp(_DEPTH_STEP * steps)), 65535.0)
     return np.where(observed, rounded, 0.0).astype(np.uint16)

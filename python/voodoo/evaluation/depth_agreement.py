@@ -45,6 +45,7 @@ in clothes, small enough that at the ankles (8 cm above the floor) only a few sq
 
 _BOX_MARGIN_M = 0.1
 WITHIN_M = 0.05
+"""Points this near to the model agree with it [m]."""
 
 
 @dataclass(frozen=True, eq=False)

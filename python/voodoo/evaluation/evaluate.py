@@ -23,12 +23,13 @@ from voodoo.config import Config
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.evaluation import metrics
 from voodoo.evaluation.calibration import Deviations, sigma_of
-from voodoo.evaluation.depth_agreement import Selection, witness
+from voodoo.evaluation.depth_agreement import WITHIN_M, Selection, witness
 from voodoo.evaluation.metrics import BoolArray, FloatArray
 from voodoo.evaluation.people import PeopleScore
 from voodoo.evaluation.people_evaluate import evaluate_people, has_people
 from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M, FrameTable, Score
 from voodoo.export.track import Track
+from voodoo.measurements import ASSUMED_RATE_HZ
 from voodoo.names import SEARCHING, Automatic, HumanModel
 from voodoo.pipeline.inputs import pictures_alone
 from voodoo.pipeline.run import track
@@ -247,10 +248,10 @@ def _score(
         tracking_class=class_,
         lost_joints=tuple(name for index, name in enumerate(metrics.JOINTS) if lost[:, index].any()),
         selection=selection if distances.size else None,
-        depth_within_5cm=metrics.fraction_within(distances, 0.05),
+        depth_within_5cm=metrics.fraction_within(distances, WITHIN_M),
         depth_median_m=float(np.median(distances)) if distances.size else np.nan,
         depth_p95_m=float(np.percentile(distances, 95.0)) if distances.size else np.nan,
-        person_within_5cm=metrics.fraction_within(distances[about], 0.05),
+        person_within_5cm=metrics.fraction_within(distances[about], WITHIN_M),
         silhouette_iou=metrics.mean_or_nan(overlaps),
         jitter_m=metrics.jitter(positions),
         reference_jitter_m=metrics.jitter(reference),
@@ -289,5 +290,5 @@ def reference_positions(recording: Recording, stamps: FloatArray) -> FloatArray:
     if reference is None:
         return np.full((len(stamps), len(metrics.JOINTS), 3), np.nan)
     table = metrics.places_of(reference.names, reference.positions)
-    period = float(np.median(np.diff(reference.stamps))) if len(reference.stamps) > 1 else 1.0 / 30.0
+    period = float(np.median(np.diff(reference.stamps))) if len(reference.stamps) > 1 else 1.0 / ASSUMED_RATE_HZ
     return metrics.match_reference(stamps, reference.stamps, table, tolerance=0.5 * period)

@@ -11,13 +11,14 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from voodoo.measurements import ROUNDED_S
 from voodoo.recordings.keypoint_layouts import LIMBS
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 
-_LIMBS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
-JOINTS = tuple(f"{side}_{joint}" for joint in _LIMBS for side in ("l", "r"))
+LIMB_JOINTS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+JOINTS = tuple(f"{side}_{joint}" for joint in LIMB_JOINTS for side in ("l", "r"))
 """The twelve joints that errors are averaged over."""
 
 LOST_AFTER_S = 0.3
@@ -33,7 +34,6 @@ BONE_OFF = 0.25
 """Tolerated relative change of the length of a reference's bone: twice the variation of Kinect's skeleton."""
 
 _BONES = tuple(limb for limb in LIMBS if not limb[1].endswith("_hip"))
-_STAMP_TOLERANCE_S = 1e-6
 
 
 def places_of(names: Sequence[str], positions: FloatArray, chosen_names: Sequence[str] = JOINTS) -> FloatArray:
@@ -122,7 +122,7 @@ def joint_angles(positions: FloatArray) -> FloatArray:
     down = (at["l_hip"] + at["r_hip"] - at["l_shoulder"] - at["r_shoulder"]) / 2.0
     angles = []
     for side in ("l", "r"):
-        shoulder, elbow, wrist, hip, knee, ankle = (at[f"{side}_{joint}"] for joint in _LIMBS)
+        shoulder, elbow, wrist, hip, knee, ankle = (at[f"{side}_{joint}"] for joint in LIMB_JOINTS)
         angles += [_between(elbow - shoulder, wrist - elbow), _between(knee - hip, ankle - knee)]
         angles += [_between(down, elbow - shoulder), _between(down, knee - hip)]
     return np.column_stack(angles)
@@ -182,7 +182,7 @@ def lost_frames(far: BoolArray, known: BoolArray, stamps: FloatArray) -> BoolArr
     edges = np.flatnonzero(flags[1:] != flags[:-1])
     for first, end in zip(edges[::2], edges[1::2], strict=True):
         run = observed[first:end]
-        if stamps[run[-1]] - stamps[run[0]] + period > LOST_AFTER_S + _STAMP_TOLERANCE_S:
+        if stamps[run[-1]] - stamps[run[0]] + period > LOST_AFTER_S + ROUNDED_S:
             lost[run] = True
     return lost
 

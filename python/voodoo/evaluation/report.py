@@ -126,10 +126,10 @@ def write_reports(
 
 
 def _joint_table(scores: Sequence[Score]) -> list[str]:
-    names = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
-    lines = table_head(("mean error, cm", *names))
+    lines = table_head(("mean error, cm", *metrics.LIMB_JOINTS))
     for side, word in (("l", "left"), ("r", "right")):
-        errors = (np.array([score.joint_error_m[f"{side}_{name}"] for score in scores]) for name in names)
+        joints = (f"{side}_{joint}" for joint in metrics.LIMB_JOINTS)
+        errors = (np.array([score.joint_error_m[joint] for score in scores]) for joint in joints)
         lines.append(table_row((word, *(written(metrics.mean_or_nan(each), (100.0, ".1f", "")) for each in errors))))
     return [*lines, ""]
 

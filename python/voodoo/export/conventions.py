@@ -10,11 +10,11 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from voodoo.export.skeleton import FloatArray, Skeleton
-from voodoo.model.rotations import euler_angles
+from voodoo.model.rotations import axes, euler_angles
 
-Y_UP_RIGHT: FloatArray = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+Y_UP_RIGHT = axes("x z -y")
 """(X, Y, Z) of OpenSim and ISB = (x, z, -y) of the standing frame: X forward, Y up, Z to the right."""
-Y_UP_LEFT: FloatArray = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+Y_UP_LEFT = axes("y z x")
 """(X, Y, Z) of BVH and glTF = (y, z, x) of the standing frame: X to the left, Y up, Z forward."""
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from voodoo.drawing.ink import person_color
 from voodoo.errors import VoodooError
 from voodoo.export.conventions import Y_UP_LEFT, names_of
 from voodoo.export.skeleton import Bone, FloatArray, held, mean_interval, placed_on_parents, skeleton
@@ -22,7 +23,6 @@ from voodoo.whole import appearing_whole
 
 _COMPONENTS = {"<f4": 5126, "<u4": 5125, "u1": 5121}
 _VERTICES, _INDICES = 34962, 34963
-_COLORS = ((0.9, 0.6, 0.3), (0.3, 0.6, 0.9), (0.5, 0.8, 0.4), (0.8, 0.4, 0.7))
 
 
 def write_glb(path: str | Path, people: Mapping[str, tuple[Track, Body]]) -> None:
@@ -43,8 +43,9 @@ def write_glb(path: str | Path, people: Mapping[str, tuple[Track, Body]]) -> Non
     """
     file = _File()
     start = min((float(track.stamps[0]) for track, _ in people.values()), default=0.0)
-    for number, (name, (track, body)) in enumerate(people.items()):
-        file.add_person(name, track, body, _COLORS[number % len(_COLORS)], start)
+    for number, (name, (track, body)) in enumerate(people.items(), start=1):
+        color = tuple(channel / 255.0 for channel in reversed(person_color(number)))  # BGR
+        file.add_person(name, track, body, color, start)
     with appearing_whole(Path(path)) as place:
         place.write_bytes(file.content())
 

@@ -17,6 +17,8 @@ import numpy.typing as npt
 import voodoo._core as _core
 from voodoo.errors import VoodooError
 from voodoo.export.track import Track
+from voodoo.measurements import ASSUMED_RATE_HZ
+from voodoo.model.at_rest import limbs_at_rest
 from voodoo.model.body import Body
 from voodoo.model.rotations import quaternions
 
@@ -50,17 +52,12 @@ class Bone:
 def bones(body: Body) -> tuple[Bone, ...]:
     """The bones of a body at rest, parents first."""
     result: list[Bone] = []
-    shifts: list[FloatArray] = []
     _, limbs, _ = body.core.parts()
-    names = body.limb_names
-    for (name, parent, shape, joint, _), turn, place in zip(limbs, *body.core.at_rest(), strict=True):
-        above, shift = None, np.zeros(3)
-        if joint is not None and parent is not None:
-            above = names.index(parent)
-            shift = result[above].rest @ np.asarray(joint[1][0]) + shifts[above] - turn @ place
-        shifts.append(shift)
-        tip = turn @ np.array([0.0, 0.0, shape.length]) + shift
-        result.append(Bone(name, above, joint[0] if joint else name, turn @ place + shift, tip, turn, place))
+    parents = [above for _, above in body.limb_tree]
+    at_rest = zip(limbs, parents, *limbs_at_rest(body), body.core.at_rest()[1], strict=True)
+    for (name, _, shape, joint, _), above, turn, origin, place in at_rest:
+        tip = turn @ np.array([0.0, 0.0, shape.length]) + origin
+        result.append(Bone(name, above, joint[0] if joint else name, turn @ place + origin, tip, turn, place))
     return tuple(result)
 
 
@@ -198,7 +195,7 @@ def mean_interval(stamps: FloatArray) -> float:
         VoodooError: stamps that do not rise.
     """
     if len(stamps) < 2:
-        return 1.0 / 30.0
+        return 1.0 / ASSUMED_RATE_HZ
     steps = np.diff(stamps)
     if (steps <= 0.0).any():
         raise VoodooError("stamps: expected rising times, found others")

@@ -10,15 +10,14 @@ import numpy as np
 
 from voodoo.export.table import FloatArray
 from voodoo.export.track import Track
-from voodoo.model.standing import is_optical, standing_along
+from voodoo.model.rotations import axes
+from voodoo.model.standing import HIGH_M, is_optical, standing_along
 from voodoo.model.transforms import pose_of
 from voodoo.recordings.marker_trajectories import Z_UP_FROM
 from voodoo.sensors.settings import LEVEL_FRAMES
 
-UPRIGHT_FROM_OPTICAL: FloatArray = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+UPRIGHT_FROM_OPTICAL = axes("z -x -y")
 """Rotation from the axes of an optical frame (x right, y down, z forward) to those of REP-103 (x forward, y left, z up)."""
-_HIGH_M = 1.5
-"""Feet that are never below this height above z = 0 are not on a floor there; stairs and platforms are lower."""
 _ANKLE_M = 0.08
 """Height of the ankle of a standing foot."""
 SUFFIX = "_upright"
@@ -88,7 +87,7 @@ def lying_words(track: Track, root_frame: str, turn: Turn | None = None) -> str:
         frames = "are images stamped with an optical frame, and its transform right?"
         return f"the body stands along {along} of {frame}, whose z axis should point up; {frames}"
     low = _ankles(standing)
-    if frame in LEVEL_FRAMES and low.size and float(np.min(low)) > _HIGH_M:
+    if frame in LEVEL_FRAMES and low.size and float(np.min(low)) > HIGH_M:
         return f"the feet are {np.min(low):.1f} m and more above the floor, z = 0 of {frame}; are the transforms right?"
     return ""
 

@@ -18,7 +18,10 @@ from voodoo.model.joint import Joint, Place, Strict, Vector, number_of, numbers_
 from voodoo.model.toml_io import parse_toml, read_text
 from voodoo.names import HumanModel
 
-__all__ = ["Body", "Joint", "Limb", "Place", "checked_joints", "ordered_poses"]
+__all__ = ["STATURE_M", "Body", "Joint", "Limb", "Place", "checked_joints", "ordered_poses"]
+
+STATURE_M = 1.75
+"""Stature of the default human [m]."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +81,7 @@ class Body:
         return tuple(Limb(name, parent, shape) for name, parent, shape, _, _ in self.core.parts()[1])
 
     @classmethod
-    def human(cls, height: float = 1.75, *, model: HumanModel = "measured") -> Body:
+    def human(cls, height: float = STATURE_M, *, model: HumanModel = "measured") -> Body:
         """The default human.
 
         Args:

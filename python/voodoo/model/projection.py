@@ -16,7 +16,8 @@ from voodoo.model.camera import Camera
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 Axes: TypeAlias = Literal["rep103", "optical"]
 
-_NEAREST_M = 0.05
+NEAREST_M = 0.05
+"""Smallest depth that a camera measures, or shows of a model [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +38,7 @@ class CameraView:
         """Pixels (N, 2) of points (N, 3) [m], NaN for invisible points, and their depths (N,) [m] along the optical axis."""
         sensor_from_root = np.linalg.inv(self.root_from_sensor)
         points = points_root @ sensor_from_root[:3, :3].T + sensor_from_root[:3, 3]
-        points[points[:, 2] < _NEAREST_M] = np.nan
+        points[points[:, 2] < NEAREST_M] = np.nan
         # Integer coordinates are pixel centers, so scaling includes an offset of half a pixel.
         return (self.camera.project(points) + 0.5) * self.scale - 0.5, points[:, 2]
 

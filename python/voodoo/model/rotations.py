@@ -13,6 +13,14 @@ import voodoo._core as _core
 FloatArray = npt.NDArray[np.float64]
 
 
+def axes(words: str) -> FloatArray:
+    """The rotation (3, 3) into coordinates that are named by those before it: by "z -x y", (x, y, z) becomes (z, -x, y)."""
+    rotation = np.zeros((3, 3))
+    for row, word in zip(rotation, words.split(), strict=True):
+        row["xyz".index(word[-1])] = -1.0 if word.startswith("-") else 1.0
+    return rotation
+
+
 def quaternions(rotations: FloatArray) -> FloatArray:
     """Unit quaternions (..., 4) of rotation matrices (..., 3, 3); the largest entry of each is positive. A matrix that is only
     approximately a rotation is replaced by the nearest rotation."""

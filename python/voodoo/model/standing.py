@@ -9,6 +9,8 @@ import numpy.typing as npt
 
 _UPRIGHT = 0.7
 """Least mean component of trunk, thighs and calves along the axis; it is 0.9 of who walks, and less of who sits or bends."""
+HIGH_M = 1.5
+"""Feet that are never below this height above z = 0 are not on a floor there; stairs and platforms are lower."""
 _SIDES = (("shoulder", "hip"), ("hip", "knee"), ("knee", "ankle"))
 
 

@@ -223,17 +223,14 @@ class FrontEnd(Generic[E]):
             predicted=tracker.predict(stamp) if person else {},
             settings=self.settings,
             tracker=tracker,
-            gate=person.gate if person else self._gate(),
+            gate=person.gate if person else SiteGate(),
             memory=person.memory if person else self.memory,
             others=others,
         )
 
-    def _gate(self) -> SiteGate:
-        return SiteGate(self.settings.gate_radius, self.settings.gate_growth, self.settings.gate_widest)
-
     def _new(self, *, trusted_start: bool) -> _Person:
         memory = Memory() if isinstance(self.tracker, People) else self.memory
-        return _Person(self._gate(), memory, trusted_start)
+        return _Person(SiteGate(), memory, trusted_start)
 
     def _take_given(self, stamp: float, used: Sequence[Any]) -> None:
         """Set the pose of a `Tracker` that was given for this frame."""

@@ -7,12 +7,15 @@ from collections.abc import Iterator
 from voodoo.measurements import RecordedFrame
 from voodoo.recordings.recording import Recording
 
+WAIT_S = 0.010
+"""How long a frame waits for measurements that belong to it [s]."""
 
-def paired(recording: Recording, *, wait: float = 0.010) -> Iterator[RecordedFrame]:
-    """The frames of a recording, each with the measurements that follow it within `wait` seconds.
+
+def paired(recording: Recording) -> Iterator[RecordedFrame]:
+    """The frames of a recording, each with the measurements that follow it within WAIT_S.
 
     A color image taken a few milliseconds after a depth image belongs to that depth image, not to the next one a whole
-    period later. This adds a latency of at most `wait`. A frame keeps the stamp of its own measurement. Complete frames are
+    period later. This adds a latency of at most WAIT_S. A frame keeps the stamp of its own measurement. Complete frames are
     not changed.
 
     Raises:
@@ -29,7 +32,7 @@ def paired(recording: Recording, *, wait: float = 0.010) -> Iterator[RecordedFra
             early = tuple(
                 item
                 for item in recorded.measurements[:-1]
-                if item.stamp - held.stamp <= wait and item.sensor not in has
+                if item.stamp - held.stamp <= WAIT_S and item.sensor not in has
             )
             yield RecordedFrame(held.stamp, held.measurements + early)
             late = tuple(item for item in recorded.measurements if not any(item is other for other in early))

@@ -10,7 +10,7 @@ from typing import Any, Generic
 
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
-from voodoo.measurements import ColorImage, Measurement, RecordedFrame
+from voodoo.measurements import ROUNDED_S, ColorImage, Measurement, RecordedFrame
 from voodoo.people import People
 from voodoo.pipeline.front_end import E, FrontEnd, Steps
 from voodoo.pipeline.pairing import paired
@@ -22,9 +22,6 @@ from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker
 
 __all__ = ["Init", "TrackedFrame", "decodable", "start_tracker", "track"]
-
-
-_ROUNDED_S = 1e-6
 
 
 def decodable(measurements: Sequence[Measurement]) -> tuple[tuple[Measurement, ...], list[VoodooError]]:
@@ -88,7 +85,7 @@ def track(
         check_findable(recording, tracker, settings.use)
     front_end = FrontEnd(tracker, settings=settings, starts=starts)
     for index, recorded in enumerate(paired(recording)):
-        if recorded.stamp < after - _ROUNDED_S:
+        if recorded.stamp < after - ROUNDED_S:
             continue
         began = time.perf_counter()
         try:

@@ -10,7 +10,7 @@ import json
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -23,24 +23,32 @@ from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.pictures import decode_color
 from voodoo.recordings.recording import Recording, SensorInfo, usable
 from voodoo.recordings.together import in_turn
+from voodoo.stored import MOST_METADATA
 
 FRAME = "depth_camera_optical_frame"
 COLOR_FRAME = "rgb_camera_optical_frame"
-_MODES = {
-    "NFOV_2X2BINNED": ((512, 512), (96, 90), (320, 288)),
-    "NFOV_UNBINNED": ((1024, 1024), (192, 180), (640, 576)),
-    "WFOV_2X2BINNED": ((512, 512), (0, 0), (512, 512)),
-    "WFOV_UNBINNED": ((1024, 1024), (0, 0), (1024, 1024)),
-    "720P": ((1280, 960), (0, 120), (1280, 720)),
-    "1080P": ((1920, 1440), (0, 180), (1920, 1080)),
-    "1440P": ((2560, 1920), (0, 240), (2560, 1440)),
-    "1536P": ((2048, 1536), (0, 0), (2048, 1536)),
-    "2160P": ((3840, 2880), (0, 360), (3840, 2160)),
-    "3072P": ((4096, 3072), (0, 0), (4096, 3072)),
-}
-"""Mode -> size of the whole sensor's image at its resolution, first column and row of the image in it, size of the image."""
+_DEPTH_PX = 1024
+"""Width and height of the depth sensor's whole image, which binning halves."""
+_FIELDS = {"NFOV": ((192, 180), (640, 576)), "WFOV": ((0, 0), (_DEPTH_PX, _DEPTH_PX))}
+"""Field of view of depth -> first column and row of the image in that of the whole sensor, and its size."""
+_COLOR_WIDTHS = {720: 1280, 1080: 1920, 1440: 2560, 1536: 2048, 2160: 3840, 3072: 4096}
+"""Height of a color image, which is in its mode's name -> width; it is cropped in the middle of a sensor of 4:3."""
+_Size: TypeAlias = tuple[int, int]
+
+
+def _modes() -> Iterator[tuple[str, tuple[_Size, _Size, _Size]]]:
+    """Modes with the size of the whole image of their sensor, first column and row of their image in it, and its size."""
+    for field, ((left, top), (width, height)) in _FIELDS.items():
+        for name, by in (("2X2BINNED", 2), ("UNBINNED", 1)):
+            whole = _DEPTH_PX // by
+            yield f"{field}_{name}", ((whole, whole), (left // by, top // by), (width // by, height // by))
+    for height, width in _COLOR_WIDTHS.items():
+        whole = 3 * width // 4
+        yield f"{height}P", ((width, whole), (0, (whole - height) // 2), (width, height))
+
+
+_MODES = dict(_modes())
 _DEPTH, _COLOR = "CALIBRATION_CameraPurposeDepth", "CALIBRATION_CameraPurposePhotoVideo"
-_MOST_ATTACHED = 2**20
 _EXPECTED = "a .mkv of an Azure Kinect or Femto Bolt (other cameras: docs/how-to/cameras.md)"
 
 
@@ -151,9 +159,9 @@ def _calibration(path: Path, film: Any) -> dict[str, Any]:  # noqa: ANN401 - PyA
     if not attached:
         raise RecordingError(f"{path}: expected the attachment calibration.json, found none")
     content = bytes(attached[0].data)
-    if len(content) > _MOST_ATTACHED:
+    if len(content) > MOST_METADATA:
         raise RecordingError(
-            f"{path}: {attached[0].name}: expected {_MOST_ATTACHED} bytes at most, found {len(content)}"
+            f"{path}: {attached[0].name}: expected {MOST_METADATA} bytes at most, found {len(content)}"
         )
     with reading(f"{path}, {attached[0].name}", "the calibration of an Azure Kinect"):
         cameras = json.loads(content.rstrip(b"\0"))["CalibrationInformation"]["Cameras"]

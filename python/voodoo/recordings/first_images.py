@@ -13,6 +13,7 @@ from voodoo.errors import VoodooError
 from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.recording import Recording, RecordingInfo
+from voodoo.recordings.truth import STILL_FRAMES
 
 _FRAMES = 10
 """Frames in which the first images are looked for."""
@@ -20,7 +21,7 @@ _LEAST_DEG, _MOST_DEG = 30.0, 150.0
 """Fields of view that depth cameras have."""
 _NEAR_M, _FAR_M = 1.2, 8.0
 """Plausible depths of a camera that observes a person: some are beyond the first limit, and the median is below the second."""
-FIXED_FRAMES = ("odom", "map", "world")
+FIXED_FRAMES = (*STILL_FRAMES, "world")
 """Root frames that stay where they are while a robot drives."""
 
 

@@ -12,7 +12,7 @@ from pathlib import Path, PurePath
 import numpy as np
 
 from voodoo.errors import RecordingError
-from voodoo.measurements import ByteImage, ColorImage, DepthImage, Measurement, RecordedFrame
+from voodoo.measurements import ASSUMED_RATE_HZ, ByteImage, ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.recordings.camera_files import FolderCalibration, PlacedCamera, read_calibration
 from voodoo.recordings.empty_scene import PICTURES
 from voodoo.recordings.left_out import LeftOut, leave_out
@@ -24,8 +24,6 @@ from voodoo.recordings.together import in_turn
 from voodoo.recordings.truth import read_beside
 from voodoo.stored import read_stored, read_stored_text
 
-_RATE = 30.0
-"""Assumed images per second of numbered images, the default of most depth cameras."""
 _MOST_NUMBERED = 1_000_000
 """Larger integers are times in seconds, not image numbers: the limit is nine hours of images."""
 _CLOCKS = {13: 1e-3, 16: 1e-6, 19: 1e-9}
@@ -168,7 +166,7 @@ class FrameClock:
             return [number * scale for number in numbers]
         if not digits or max(numbers) > _MOST_NUMBERED:
             return numbers
-        rate = self._rate or _RATE
+        rate = self._rate or ASSUMED_RATE_HZ
         message = f"{files[0].parent.name}/ is numbered, and taken for {rate:g} images/s"
         self.notes += [message if self._rate else f"{message}; --option rate=N says another rate"]
         return [number / rate for number in numbers]

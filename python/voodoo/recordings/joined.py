@@ -10,7 +10,16 @@ from itertools import islice
 from pathlib import Path
 
 from voodoo.errors import RecordingError
-from voodoo.measurements import ByteImage, ColorImage, DepthImage, FloatArray, KeypointImage, Measurement, RecordedFrame
+from voodoo.measurements import (
+    ROUNDED_S,
+    ByteImage,
+    ColorImage,
+    DepthImage,
+    FloatArray,
+    KeypointImage,
+    Measurement,
+    RecordedFrame,
+)
 from voodoo.recordings.keypoint_check import check_keypoints, check_on_depth, some_of, taken_layout
 from voodoo.recordings.keypoint_files import read_people
 from voodoo.recordings.keypoint_layouts import layout_of
@@ -119,7 +128,7 @@ class _Ahead:
     def until(self, stamp: float) -> tuple[Measurement, ...]:
         """Measurements since the last call, up to `stamp`: the last of each sensor."""
         found: tuple[Measurement, ...] = ()
-        while self._next is not None and self._next.stamp + self._offset <= stamp + 1e-6:
+        while self._next is not None and self._next.stamp + self._offset <= stamp + ROUNDED_S:
             moved = tuple(replace(item, stamp=item.stamp + self._offset) for item in self._next.measurements)
             latest = {item.sensor for item in moved}
             found = tuple(item for item in found if item.sensor not in latest) + moved

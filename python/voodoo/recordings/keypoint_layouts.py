@@ -1,7 +1,7 @@
 """Table that maps the keypoints of common networks to the sites of the body.
 
-Each row has a site, {keypoint index: weight} and a spread [m]. A site is the weighted sum of its keypoints; the spread is the
-distance between the network's definition of the joint and ours (a hip keypoint sits on the skin, a neck keypoint between
+A layout has for each site {keypoint index: weight} and a spread [m]. A site is the weighted sum of its keypoints; the spread
+is the distance between the network's definition of the joint and ours (a hip keypoint sits on the skin, a neck keypoint between
 the shoulders, ears below the middle of the head).
 Sites that only repeat other keypoints (a neck that a network computes from the two shoulders) are left out, because they
 would count one error twice.
@@ -9,7 +9,7 @@ would count one error twice.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, TypeVar
@@ -23,10 +23,15 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 _SPREADS = {
-    "shoulder": 0.03, "elbow": 0.02, "wrist": 0.02, "hip": 0.04, "knee": 0.02, "ankle": 0.02, "toe": 0.05,
-    "head_center": 0.06, "skullbase": 0.05, "skull_tip": 0.05, "vc7": 0.05, "humanoid_root": 0.04, "l_hand": 0.02, "r_hand": 0.02,
+    "shoulder": 0.03, "elbow": 0.02, "wrist": 0.02, "hip": 0.04, "knee": 0.02, "ankle": 0.02, "toe": 0.05, "hand": 0.02,
+    "head_center": 0.06, "skullbase": 0.05, "skull_tip": 0.05, "vc7": 0.05, "humanoid_root": 0.04,
 }  # fmt: skip
-"""Spread of a site [m]; the joints of both sides come first, in the order in which most networks have them."""
+"""Spread of a site of either side, or of the middle [m]."""
+_COMPUTED = {"head_center": {"l_ear": 0.5, "r_ear": 0.5}} | {
+    f"{side}_hand": {f"{side}_wrist": 0.4, f"{side}_pinky": 0.3, f"{side}_index": 0.3} for side in "lr"
+}
+"""Sites between keypoints, with their weights: the midpoint of the ears is the center of the head from every direction, and the
+palm's center lies between the wrist and the knuckles of the little finger and the index finger."""
 
 
 @dataclass(frozen=True)
@@ -50,53 +55,52 @@ class Layout:
     midpoints: tuple[tuple[int, int, int], ...] = ()
 
 
-def _layout(
-    count: int,
-    *pairs: tuple[int, int],
-    names: Iterable[str] = _SPREADS,
-    midpoints: tuple[tuple[int, int, int], ...] = (),
-    **others: Mapping[int, float],
-) -> Layout:
-    """A layout, by the keypoints of each joint on the left and on the right, and those of other sites with their weights.
+def _layout(words: str, **midpoints: str) -> Layout:
+    """A layout by the names of its keypoints, in their order; those with the name of a site are measurements of it.
 
-    There may be more names than joints.
+    A midpoint is given by the joint whose two sides it lies between.
     """
-    joints = [
-        SiteKeypoints(prefix + name, {pair[side]: 1.0}, _SPREADS[name])
-        for side, prefix in enumerate(("l_", "r_"))
-        for name, pair in zip(names, pairs, strict=False)
+    names = words.split()
+    sites = {name: {name: 1.0} for side in ("l_", "r_") for name in names if name.startswith(side)}
+    sites |= {site: weights for site, weights in _COMPUTED.items() if weights.keys() <= set(names)}
+    sites |= {name: {name: 1.0} for name in names if name not in sites}
+    parts = [
+        SiteKeypoints(site, {names.index(name): weight for name, weight in weights.items()}, _SPREADS[kind])
+        for site, weights in sites.items()
+        if (kind := site.removeprefix("l_").removeprefix("r_")) in _SPREADS
     ]
-    sites = [SiteKeypoints(site, weights, _SPREADS[site]) for site, weights in others.items()]
-    return Layout(count, (*joints, *sites), midpoints)
+    middles = []
+    for middle, joint in midpoints.items():
+        one, other = sorted(names.index(f"{side}_{joint}") for side in "lr")
+        middles.append((names.index(middle), one, other))
+    return Layout(len(names), tuple(parts), tuple(middles))
 
 
-_LEGS_FIRST = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
-_COCO = ((5, 6), (7, 8), (9, 10), (11, 12), (13, 14), (15, 16))
-_COCO_EARS = {3: 0.5, 4: 0.5}
-"""The midpoint of the ears is the center of the head from every direction."""
+_COCO = """nose l_eye r_eye l_ear r_ear l_shoulder r_shoulder l_elbow r_elbow l_wrist r_wrist l_hip r_hip l_knee r_knee l_ankle
+    r_ankle """
 
 LAYOUTS: dict[str, Layout] = {
-    # nose, eyes, ears (3, 4), then pairs from the shoulders to the ankles
-    "coco17": _layout(17, *_COCO, head_center=_COCO_EARS),
-    # OpenPose: its neck (1) and mid-hip (8) are computed from the shoulders and hips
+    "coco17": _layout(_COCO),
+    # OpenPose
     "body25": _layout(
-        25, (5, 2), (6, 3), (7, 4), (12, 9), (13, 10), (14, 11), (19, 22),
-        head_center={18: 0.5, 17: 0.5}, midpoints=((1, 2, 5), (8, 9, 12)),
+        """nose neck r_shoulder r_elbow r_wrist l_shoulder l_elbow l_wrist mid_hip r_hip r_knee r_ankle l_hip l_knee l_ankle
+        r_eye l_eye r_ear l_ear l_toe l_small_toe l_heel r_toe r_small_toe r_heel""",
+        neck="shoulder", mid_hip="hip",
     ),
-    # OpenPose BODY_25B: COCO, then upper neck (17) and head top (18) of MPII, then feet
-    "body25b": _layout(25, *_COCO, (19, 22), head_center=_COCO_EARS, skullbase={17: 1.0}, skull_tip={18: 1.0}),
-    # MediaPipe: 33 landmarks; ears 7 and 8; the palm's center lies between the wrist and the knuckles of the little finger
-    # (17, 18) and the index finger (19, 20)
+    # OpenPose BODY_25B: after COCO the upper neck and the head top of MPII
+    "body25b": _layout(_COCO + "skullbase skull_tip l_toe l_small_toe l_heel r_toe r_small_toe r_heel"),
+    # MediaPipe
     "blazepose33": _layout(
-        33, (11, 12), (13, 14), (15, 16), (23, 24), (25, 26), (27, 28), (31, 32), head_center={7: 0.5, 8: 0.5},
-        l_hand={15: 0.4, 17: 0.3, 19: 0.3}, r_hand={16: 0.4, 18: 0.3, 20: 0.3},
+        """nose l_inner_eye l_eye l_outer_eye r_inner_eye r_eye r_outer_eye l_ear r_ear l_mouth r_mouth l_shoulder r_shoulder
+        l_elbow r_elbow l_wrist r_wrist l_pinky r_pinky l_index r_index l_thumb r_thumb l_hip r_hip l_knee r_knee
+        l_ankle r_ankle l_heel r_heel l_toe r_toe"""
     ),
-    # COCO, then top of the head (17), neck (18), hip (19), and feet in pairs from the big toes (20, 21)
-    "halpe26": _layout(26, *_COCO, (20, 21), head_center=_COCO_EARS, skull_tip={17: 1.0}, vc7={18: 1.0}),
-    # pelvis, right leg, left leg, spine, thorax (8), nose (9), top of the head (10), left arm, right arm
+    "halpe26": _layout(_COCO + "skull_tip vc7 mid_hip l_toe r_toe l_small_toe r_small_toe l_heel r_heel"),
+    # Human3.6M
     "h36m17": _layout(
-        17, (4, 1), (5, 2), (6, 3), (11, 14), (12, 15), (13, 16), names=_LEGS_FIRST,
-        humanoid_root={0: 1.0}, vc7={8: 1.0}, skull_tip={10: 1.0}, midpoints=((0, 1, 4), (8, 11, 14)),
+        """humanoid_root r_hip r_knee r_ankle l_hip l_knee l_ankle spine vc7 nose skull_tip l_shoulder l_elbow l_wrist
+        r_shoulder r_elbow r_wrist""",
+        humanoid_root="hip", vc7="shoulder",
     ),
 }  # fmt: skip
 """Layout by name."""

@@ -10,18 +10,16 @@ import numpy as np
 from pydantic import Field, FiniteFloat
 
 from voodoo.errors import RecordingError, shortened
-from voodoo.measurements import FloatArray, MarkerSet, RecordedFrame
+from voodoo.measurements import MARKER_SIGMA_M, FloatArray, MarkerSet, RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.joint import Strict, valid
-from voodoo.model.standing import standing_along
+from voodoo.model.standing import HIGH_M, standing_along
 from voodoo.model.toml_io import parse_toml, read_text
 from voodoo.recordings.marker_trajectories import Z_UP_FROM, MarkerTrajectories, read_markers
 from voodoo.recordings.pose2sim import SITES
 from voodoo.recordings.recording import Recording, SensorInfo, Start
 
 FRAME = "world"
-_HIGH_M = 1.5
-"""Markers of feet that are never lower are not those of who walks on the floor of the laboratory."""
 
 
 class OnLimb(Strict):
@@ -51,7 +49,7 @@ class MarkerMap(Strict):
     sites: dict[str, str] = Field(default_factory=dict)
     limbs: dict[str, OnLimb] = Field(default_factory=dict)
     y_up: bool | None = None
-    sigma_m: Annotated[FiniteFloat, Field(gt=0.0)] = 0.02
+    sigma_m: Annotated[FiniteFloat, Field(gt=0.0)] = MARKER_SIGMA_M
 
     @classmethod
     def load(cls, path: Path) -> MarkerMap:
@@ -138,7 +136,7 @@ class MarkerRecording(Recording):
         likely = self._likely
         heights = self._positions[..., 2][np.isfinite(self._positions[..., 2])]
         if likely in ("", self._up):
-            if not {"l_ankle", "r_ankle"} & set(self._sites) or not heights.size or heights.min() < _HIGH_M:
+            if not {"l_ankle", "r_ankle"} & set(self._sites) or not heights.size or heights.min() < HIGH_M:
                 return ()
             words = f"{self._up} of the file is taken for up, and no marker is lower than {heights.min():.1f} m"
             return (f"{self.path.name}: {words}; are axes and unit right?",)

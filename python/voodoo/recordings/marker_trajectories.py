@@ -15,21 +15,22 @@ import numpy as np
 
 from voodoo.errors import RecordingError, reading, shortened
 from voodoo.measurements import FloatArray
+from voodoo.model.rotations import axes
 from voodoo.stored import numbers_in, read_stored, read_stored_text
 
-Z_UP_FROM_Y_UP: FloatArray = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+Z_UP_FROM_Y_UP = axes("z x y")
 """Rotation from OpenSim's axes (X forward, Y up, Z to the right) to REP-103's order of axes (Z up): (x, y, z) = (Z,
 X, Y).
 
 This is Pose2Sim's convention; it preserves handedness, but not the direction in which a person faces."""
 
 Z_UP_FROM: dict[str, FloatArray] = {
-    "+X": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
+    "+X": axes("y z x"),
     "+Y": Z_UP_FROM_Y_UP,
-    "+Z": np.eye(3),
-    "-X": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]]),
-    "-Y": np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]),
-    "-Z": np.diag([1.0, -1.0, -1.0]),
+    "+Z": axes("x y z"),
+    "-X": axes("y -z -x"),
+    "-Y": axes("-z x -y"),
+    "-Z": axes("x -y -z"),
 }
 """Axis of a file that points up -> rotation to z up."""
 

@@ -15,18 +15,15 @@ from voodoo.recordings import realsense
 from voodoo.recordings.empty_scene import EmptyScene
 from voodoo.recordings.left_out import LeftOut, leave_out, leaving_out
 from voodoo.recordings.recording import Recording, SensorInfo, mean_rate, number_option, usable
-from voodoo.recordings.ros_bag import Bag
+from voodoo.recordings.ros_bag import TF_TYPES, Bag
 from voodoo.recordings.ros_messages import Message, camera_of, measured, stamp_of
 from voodoo.recordings.ros_topics import TopicChoice, TopicFinder, TopicSource, checked_numbers
 from voodoo.recordings.set_back import SetBack, out_of_order
 from voodoo.recordings.together import in_turn, together
 from voodoo.recordings.transforms import TransformTree, matrix
-from voodoo.recordings.truth import OWN_ROOTS, find_beside, read_beside
+from voodoo.recordings.truth import OWN_ROOTS, STILL_FRAMES, find_beside, read_beside
 
 _MILLIMETER = 0.001
-STILL_FRAMES = ("odom", "map")
-"""Fixed frames of a moving robot (REP-105): the first is smooth but drifts, the second has no drift but jumps."""
-_TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 
 class RosRecording(Recording):
@@ -197,7 +194,7 @@ class RosRecording(Recording):
     def _read_transforms(self, asked: str | None, sources: Sequence[TopicSource]) -> str:
         """Fill the transform tree and choose the root frame."""
         self._read_recorders_transforms()
-        names = [t.name for t in self._bag.topics if t.type in _TF_TYPES and t.messages]
+        names = [t.name for t in self._bag.topics if t.type in TF_TYPES and t.messages]
         static = [name for name in names if name.endswith("tf_static")]
         dynamic = [name for name in names if name not in static]
         for topics, is_static in ((static, True), (dynamic, False)):

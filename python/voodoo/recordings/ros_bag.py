@@ -29,6 +29,7 @@ from voodoo.recordings.ros_messages import Message, frame_of
 from voodoo.stored import MOST_RECORDED, check_stored
 from voodoo.unpacking import Unpacking
 
+TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 _TRANSFORMS = "geometry_msgs/TransformStamped[] transforms"
 _MOST_TEXT = 2**16
 """Largest size of the definition of a type [bytes]; those of ROS are ten times smaller."""
@@ -49,7 +50,7 @@ class MessageTypes:
         self._is_ros2 = is_ros2
         self._store: Typestore = get_typestore(Stores.ROS2_HUMBLE if is_ros2 else Stores.ROS1_NOETIC)
         if not is_ros2:
-            for name in ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"):
+            for name in TF_TYPES:
                 self._store.register(get_types_from_msg(_TRANSFORMS, name))
         self._checked: set[tuple[str, str, str]] = set()
 

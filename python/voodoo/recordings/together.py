@@ -9,7 +9,8 @@ from itertools import pairwise
 from voodoo.measurements import Measurement, RecordedFrame
 
 FARTHEST_S = 0.25
-"""An image with a larger time difference [s] belongs to no frame, even at low frame rates."""
+"""An image with a larger time difference [s] belongs to no frame, even at low frame rates: the pose differs, and the tracker
+would reject the frame."""
 _AHEAD = 2
 
 

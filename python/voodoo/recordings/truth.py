@@ -24,6 +24,8 @@ from voodoo.stored import MOST_BYTES, MOST_METADATA, numbers_in, read_stored_tex
 
 OWN_ROOTS = ("base_link", "world")
 """The default root frame of a recording is the first of these in its transforms; the files are in it."""
+STILL_FRAMES = ("odom", "map")
+"""Fixed frames of a moving robot (REP-105): the first is smooth but drifts, the second has no drift but jumps."""
 PEOPLE_TRUTH_FILE = "truth_people.csv"
 _FIRST = ("stamp_s", "person", "in_view")
 _LAST = np.iinfo(np.int32).max

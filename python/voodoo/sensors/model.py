@@ -32,6 +32,9 @@ PAPER_WEIGHTS: dict[str, float] = {"point": 1.0, "face": 30.0, "hand": 20.0}
 POINTS_SHARING = 25.0
 """Neighboring pixels of a depth image that share one error."""
 
+TYPICAL_RANGE_M = 3.0
+"""Assumed range of a person whose position is not known yet [m]."""
+
 
 def check_number(name: str, value: float, *, zero: bool = True) -> None:
     """Raise an error for a number that is not finite, negative, or zero if that is not allowed."""

@@ -17,6 +17,8 @@ AGREE_M = 0.08
 """A ray at this distance from a position has a quarter of the weight of a ray through it; networks have errors of 2 to 6 cm."""
 TRUSTED = 0.25
 """A ray with less trust does not support the position."""
+_LEAST_TRUST = 0.05
+"""Rays with less trust are not used."""
 _PARALLEL = 1e-3
 """Rays whose directions differ by less than 2 degrees (sine squared) do not determine a position."""
 
@@ -36,11 +38,11 @@ class TriangulatedSite:
     trust: FloatArray
 
 
-def place_of(rays: Sequence[SiteRay], *, scale: float = AGREE_M) -> TriangulatedSite | None:
+def place_of(rays: Sequence[SiteRay]) -> TriangulatedSite | None:
     """Triangulates the rays of one site by robust least squares; returns None if fewer than two rays agree.
 
     Every pair of rays gives an initial position. The one with the most support from all rays is refined with the
-    Geman-McClure weight `(s^2 / (s^2 + r^2))^2` of a ray's distance r from it, s = `scale` [m].
+    Geman-McClure weight `(s^2 / (s^2 + r^2))^2` of a ray's distance r from it, s = AGREE_M.
     """
     if len(rays) < 2:
         return None
@@ -51,8 +53,8 @@ def place_of(rays: Sequence[SiteRay], *, scale: float = AGREE_M) -> Triangulated
     pairs = map(list, combinations(range(len(rays)), 2))
     points = [_meeting(origins[pair], directions[pair], planes[pair]) for pair in pairs]
     known = [point for point in points if point is not None]
-    best = max(known, key=lambda point: trust_at(point, origins, directions, scale=scale).sum(), default=None)
-    found = None if best is None else met(origins, directions, information, best, scale=scale)
+    best = max(known, key=lambda point: trust_at(point, origins, directions).sum(), default=None)
+    found = None if best is None else met(origins, directions, information, best)
     if found is None:
         return None
     point, trust = found
@@ -77,12 +79,12 @@ _STEPS = 20
 _MOVED_M = 1e-4
 
 
-def agreed(rays: Sequence[SiteRay], *, predicted: Mapping[str, FloatArray], scale: float = AGREE_M) -> list[SiteRay]:
+def agreed(rays: Sequence[SiteRay], *, predicted: Mapping[str, FloatArray]) -> list[SiteRay]:
     """Returns the rays with a trust that measures how well those of one site agree.
 
     With three rays or more to a site, its position is found by reweighted least squares from the predicted position;
-    the Geman-McClure weight `(s^2 / (s^2 + r^2))^2` of a ray's distance r from it is the ray's trust, s = `scale`
-    [m]. So a camera whose network confuses a joint is outvoted by the others instead of pulling the limb half way. With
+    the Geman-McClure weight `(s^2 / (s^2 + r^2))^2` of a ray's distance r from it is the ray's trust, s = AGREE_M.
+    So a camera whose network confuses a joint is outvoted by the others instead of pulling the limb half way. With
     fewer than three rays the trust is unchanged.
     """
     groups: dict[str, list[int]] = {}
@@ -97,7 +99,7 @@ def agreed(rays: Sequence[SiteRay], *, predicted: Mapping[str, FloatArray], scal
         information = np.array([rays[index].trust / rays[index].sigma ** 2 for index in members])
         # The prediction is a weak prior, so that the position is determined for parallel rays too.
         prior = 0.01 * float(information.max())
-        found = met(origins, directions, information, predicted[site], scale=scale, prior=prior)
+        found = met(origins, directions, information, predicted[site], prior=prior)
         for index, trust in zip(members, found[1], strict=True) if found else ():
             result[index] = result[index].trusted(result[index].trust * float(trust))
     return result
@@ -108,12 +110,12 @@ def across(directions: FloatArray) -> FloatArray:
     return np.asarray(np.eye(3) - directions[:, :, None] * directions[:, None, :])
 
 
-def trust_at(point: FloatArray, origins: FloatArray, directions: FloatArray, *, scale: float) -> FloatArray:
+def trust_at(point: FloatArray, origins: FloatArray, directions: FloatArray) -> FloatArray:
     """The Geman-McClure weights (N,) of the distances of rays from a point; 0 of rays that lead away from it."""
     towards = point - origins
     along = (towards * directions).sum(axis=1)
     distance2 = np.square(towards - along[:, None] * directions).sum(axis=1)
-    return np.where(along > 0.0, (scale**2 / (scale**2 + distance2)) ** 2, 0.0)
+    return np.where(along > 0.0, (AGREE_M**2 / (AGREE_M**2 + distance2)) ** 2, 0.0)
 
 
 def met(
@@ -122,7 +124,6 @@ def met(
     information: FloatArray,
     start: FloatArray,
     *,
-    scale: float,
     prior: float = 0.0,
 ) -> tuple[FloatArray, FloatArray] | None:
     """Where rays meet, by reweighted least squares, and the trust of each; None if they do not determine a point.
@@ -131,24 +132,23 @@ def met(
         origins, directions: (N, 3) of the rays.
         information: (N,) inverse variances [1/m^2].
         start: the first position (3,) [m].
-        scale: see `agreed`.
         prior: information of `start` [1/m^2].
     """
     planes, point = across(directions), start
     offsets = np.einsum("nij,nj->ni", planes, origins)
     for _ in range(_STEPS):
-        weights = information * trust_at(point, origins, directions, scale=scale)
+        weights = information * trust_at(point, origins, directions)
         matrix = (weights[:, None, None] * planes).sum(axis=0) + prior * np.eye(3)
         if not prior and float(np.linalg.eigvalsh(matrix)[0]) <= 0.0:
             return None
         before, point = point, np.linalg.solve(matrix, weights @ offsets + prior * start)
         if float(np.linalg.norm(point - before)) < _MOVED_M:
             break
-    return point, trust_at(point, origins, directions, scale=scale)
+    return point, trust_at(point, origins, directions)
 
 
-def add_rays(frame: Frame, rays: Sequence[SiteRay], *, model: SensorModel, min_trust: float = 0.05) -> int:
-    """Add rays with the weights of their standard deviations; rays with a trust below `min_trust` are left out.
+def add_rays(frame: Frame, rays: Sequence[SiteRay], *, model: SensorModel) -> int:
+    """Add rays with the weights of their standard deviations; those that others contradict are left out.
 
     Returns:
         The number of rays added.
@@ -159,5 +159,5 @@ def add_rays(frame: Frame, rays: Sequence[SiteRay], *, model: SensorModel, min_t
     if not rays:
         return 0
     return frame._add_site_rays(
-        rays, reference_sigma=model.reference_sigma, max_weight=model.max_weight, min_trust=min_trust
+        rays, reference_sigma=model.reference_sigma, max_weight=model.max_weight, min_trust=_LEAST_TRUST
     )

@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
-from voodoo.measurements import ByteImage, FloatArray
+from voodoo.measurements import MARKER_SIGMA_M, ByteImage, FloatArray
 from voodoo.model.joint import corners
 from voodoo.names import INPUTS
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.depth import DepthFilter
-from voodoo.sensors.keypoints.sites import check_confidence
+from voodoo.sensors.keypoints.sites import MIN_CONFIDENCE, check_confidence
 from voodoo.sensors.model import PLANAR_LASER, POINTS_SHARING, PixelNoise, RangeNoise, SensorModel
 from voodoo.sensors.skin.settings import SkinSettings
 
@@ -50,8 +50,6 @@ class FrontEndSettings:
         scan_sharing: number of neighboring returns of a scan that share one error; its beams lie farther apart.
         keypoint_noise: of 2-D keypoints.
         min_confidence: keypoints with a lower confidence are not used.
-        gate_radius, gate_growth, gate_widest: see SiteGate.
-        agreement: scale [m] of `agreed`; 0 switches it off.
         marker_sigma: standard deviation [m] of a marker that is given without one.
         depth_filter: removes pixels from depth images; None uses the images unchanged.
         skin: settings of the skin-color cue.
@@ -71,12 +69,8 @@ class FrontEndSettings:
     sharing: float = POINTS_SHARING
     scan_sharing: float = 4.0
     keypoint_noise: PixelNoise = field(default_factory=PixelNoise)
-    min_confidence: float = 0.1
-    gate_radius: float = 0.15
-    gate_growth: float = 0.5
-    gate_widest: float = 0.40
-    agreement: float = 0.08
-    marker_sigma: float = 0.02
+    min_confidence: float = MIN_CONFIDENCE
+    marker_sigma: float = MARKER_SIGMA_M
     depth_filter: DepthFilter | None = None
     skin: SkinSettings = field(default_factory=SkinSettings)
     exclude: tuple[Box, ...] = ()

@@ -20,6 +20,7 @@ from voodoo.errors import VoodooError, installed
 from voodoo.export.skeleton import mean_interval
 from voodoo.export.table import FloatArray
 from voodoo.export.track import Track
+from voodoo.measurements import ASSUMED_RATE_HZ
 
 _LINES = (
     ("humanoid_root", "vc7", "skullbase", "head_center", "skull_tip"),
@@ -77,7 +78,7 @@ def playable(film: Path) -> bytes:
         raise VoodooError(f"{film}: expected a film, found none that can be read")
     with TemporaryDirectory() as folder:
         place = Path(folder) / "film.webm"
-        rate, size = source.get(cv2.CAP_PROP_FPS) or 30.0, picture.shape[1::-1]
+        rate, size = source.get(cv2.CAP_PROP_FPS) or ASSUMED_RATE_HZ, picture.shape[1::-1]
         writer = cv2.VideoWriter(str(place), cv2.VideoWriter.fourcc(*"VP80"), rate, size)
         while readable:
             writer.write(picture)

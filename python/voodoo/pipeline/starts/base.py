@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.measurements import FloatArray, KeypointImage
+from voodoo.model.at_rest import proportion
 from voodoo.model.body import Body
-from voodoo.recordings.keypoint_layouts import of_both_sides
+from voodoo.recordings.keypoint_layouts import LIMBS, of_both_sides
 from voodoo.sensors.keypoints.sites import SitePixel, site_pixels
 from voodoo.sensors.settings import FrontEndSettings
 
@@ -144,24 +145,13 @@ def in_proportion(joints: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     ]
     if not trunk:
         return {}
-    limits = {bone: (_SHORTER * fraction, _LONGER * fraction) for bone, fraction in _OF_STATURE.items()}
-    return _with_bones(joints, limits, unit=float(np.mean(trunk)) / _OF_STATURE["l_shoulder", "l_hip"])
+    limits = {bone: (_SHORTER * proportion(*bone), _LONGER * proportion(*bone)) for bone in _IN_PROPORTION}
+    return _with_bones(joints, limits, unit=float(np.mean(trunk)) / proportion("l_shoulder", "l_hip"))
 
 
 _SHORTER, _LONGER = 0.6, 1.6
 """Tolerance: bones of persons differ from these proportions by 10 percent; further 4 cm of error are allowed at either end."""
-_OF_STATURE: dict[tuple[str, str], float] = {
-    ("l_shoulder", "r_shoulder"): 0.224,
-    ("l_hip", "r_hip"): 0.104,
-} | of_both_sides({
-    ("shoulder", "hip"): 0.294,
-    ("shoulder", "elbow"): 0.186,
-    ("elbow", "wrist"): 0.146,
-    ("hip", "knee"): 0.245,
-    ("knee", "ankle"): 0.246,
-}) | {
-    ("l_shoulder", "skullbase"): 0.146,
-    ("l_shoulder", "head_center"): 0.164,
-    ("l_shoulder", "skull_tip"): 0.211,
-}  # fmt: skip
-"""Distances of sites of the default human, as fractions of the stature; parents first."""
+_IN_PROPORTION = (
+    ("l_shoulder", "r_shoulder"), ("l_hip", "r_hip"), *LIMBS,
+    ("l_shoulder", "skullbase"), ("l_shoulder", "head_center"), ("l_shoulder", "skull_tip"),
+)  # fmt: skip

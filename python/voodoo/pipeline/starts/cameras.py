@@ -13,6 +13,7 @@ import numpy as np
 from voodoo.measurements import FloatArray, KeypointImage
 from voodoo.pipeline.starts import base
 from voodoo.pipeline.starts.base import FoundStart, StartFinder, StartFrame
+from voodoo.sensors.model import TYPICAL_RANGE_M
 from voodoo.sensors.pixels import ray_distance, world_rays
 from voodoo.sensors.rays import SiteRay, TriangulatedSite, place_of
 
@@ -21,8 +22,6 @@ _BASELINE_M = 0.1
 _SAME_PERSON_M = 0.15
 """Largest median distance of a person's rays in one camera from the triangulated positions: half the distance to a neighbor."""
 _WORST_SIGMA_M = 0.10
-_TYPICAL_RANGE_M = 3.0
-"""Range at which a pixel error is converted to meters before the position is known."""
 
 
 _Person: TypeAlias = dict[str, SiteRay]
@@ -105,7 +104,7 @@ def _person(item: KeypointImage, rows: FloatArray, frame: StartFrame) -> _Person
     rays = {}
     for site, direction in zip(sites, directions, strict=True):
         if np.isfinite(direction).all():
-            sigma = noise.sigma(_TYPICAL_RANGE_M, focal, confidence=site.confidence, spread=site.spread)
+            sigma = noise.sigma(TYPICAL_RANGE_M, focal, confidence=site.confidence, spread=site.spread)
             rays[site.site] = SiteRay(site.site, origin, direction, sigma, item.sensor)
     return rays if len(rays) >= base.LEAST_SITES else {}
 

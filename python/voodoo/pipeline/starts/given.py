@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from voodoo.export.track import Track
+from voodoo.measurements import ROUNDED_S
 from voodoo.pipeline.starts.base import FoundStart, StartFinder, StartFrame, fixes_pose
 
 _SAME_TIME_S = 0.02
 """Stamps that differ by less belong to one frame; at most half a period of the result."""
-_ROUNDED_S = 1e-6
 _GIVEN_SIGMA_M = 0.03
 _USABLE = ("tracking", "degraded")
 
@@ -34,7 +34,7 @@ class GivenStart(StartFinder):
 
     def find(self, frame: StartFrame) -> Sequence[FoundStart]:
         """See StartFinder."""
-        if frame.stamp < self._stamp - _ROUNDED_S:
+        if frame.stamp < self._stamp - ROUNDED_S:
             return []
         return [FoundStart(self._joints, dict.fromkeys(self._joints, _GIVEN_SIGMA_M), self.name)]
 

@@ -13,11 +13,8 @@ from voodoo.measurements import DepthImage, FloatArray, KeypointImage
 from voodoo.pipeline.starts import base
 from voodoo.pipeline.starts.base import FoundStart, StartFinder, StartFrame
 from voodoo.sensors.depth import depth_points
-from voodoo.sensors.keypoints.sites import POINT_SIGMA_M, SitePixel, behind_surface
+from voodoo.sensors.keypoints.sites import POINT_SIGMA_M, WINDOW_PX, SitePixel, behind_surface
 from voodoo.sensors.pixels import in_sensor, world_rays
-
-_AROUND = 2.5
-"""The surface is searched for within this many pixels, as in a 5 x 5 window; for a coarser depth camera, in its pixels."""
 
 _Person: TypeAlias = dict[str, tuple[FloatArray, float]]
 """Site -> position (3,) and standard deviation [m]."""
@@ -74,7 +71,8 @@ def _placed(
     focal = math.sqrt(item.camera.fx * item.camera.fy)
     placed: _Person = {}
     for site, direction in zip(sites, directions, strict=True):
-        depth = _core.nearest_surface(*points, pixel=site.pixel, radius=_AROUND * max(coarse, 1.0))
+        # For a coarser depth camera the window is in its pixels.
+        depth = _core.nearest_surface(*points, pixel=site.pixel, radius=WINDOW_PX / 2.0 * max(coarse, 1.0))
         if depth is None or not np.isfinite(direction).all():
             continue
         surface = depth / float(direction @ item.root_from_sensor[:3, 2])

@@ -15,7 +15,8 @@ import voodoo._core as _core
 from voodoo._core import TaperedEllipticCylinder
 from voodoo.errors import BodyError, naming
 from voodoo.measurements import FloatArray, LaserScan
-from voodoo.model.body import Body, Joint, Place
+from voodoo.model.at_rest import proportion
+from voodoo.model.body import STATURE_M, Body, Joint, Place
 from voodoo.model.projection import transform
 from voodoo.pipeline.starts.base import FoundStart, StartFinder, StartFrame
 from voodoo.sensors.settings import Box, within_boxes
@@ -35,8 +36,8 @@ _FASTEST = 2.5
 """Speed of the swinging shin of a walking person [m/s]."""
 _PATIENCE_S = 0.6
 """One leg may occlude the other for this time [s]."""
-_STATURE_M, _SHIN_HEIGHT_M = 1.75, 0.30
-"""Uncertainty of the person's size and of the laser's height above an unknown floor."""
+_SHIN_HEIGHT_M = 0.30
+"""Height of the laser above an unknown floor."""
 _MOVED_M = 0.05
 """A pair that moved less gives no evidence for its facing direction."""
 _SIGMA_M = 0.10
@@ -191,20 +192,30 @@ def _found(legs: FloatArray, moved: FloatArray, scan: LaserScan, frame: StartFra
     floor = height - _SHIN_HEIGHT_M if ground is None else ground
     joints: dict[str, FloatArray] = {}
     for side, sign, leg in zip("lr", (1.0, -1.0), sorted(legs, key=lambda leg: -float(leg @ left)), strict=True):
-        hip = np.array([*(middle + sign * HALF_WIDTH * _STATURE_M * left), floor + HIP * _STATURE_M])
+        hip = np.array([*(middle + sign * _half_width() * STATURE_M * left), floor + _HIP * STATURE_M])
         shin = np.array([*leg, height])
         joints[f"{side}_hip"] = hip
-        joints[f"{side}_ankle"] = hip + (shin - hip) / np.linalg.norm(shin - hip) * LEG * _STATURE_M
+        joints[f"{side}_ankle"] = hip + (shin - hip) / np.linalg.norm(shin - hip) * _leg() * STATURE_M
     return FoundStart(joints, dict.fromkeys(joints, _SIGMA_M), LegsStart.name)
 
 
-HIP, LEG, HALF_WIDTH = 0.530, 0.491, 0.052
-"""Height of the hips, length of a leg and half the distance of the hips, as fractions of the stature of the default human."""
+def _leg() -> float:
+    """Length of a leg, as a fraction of the stature."""
+    return proportion("l_hip", "l_knee", "l_ankle")
+
+
+def _half_width() -> float:
+    """Half the distance of the hips, as a fraction of the stature."""
+    return 0.5 * proportion("l_hip", "r_hip")
+
+
+_HIP = 0.530
+"""Height of the hips above the floor, as a fraction of the stature."""
 _GIRTH = (0.075, 0.05)
 """Radii at hip and ankle [m], in trousers."""
 
 
-def legs_body(height: float = 1.75) -> Body:
+def legs_body(height: float = STATURE_M) -> Body:
     """Two legs on a pelvis, without knees, as observed by a planar laser.
 
     Args:
@@ -214,12 +225,13 @@ def legs_body(height: float = 1.75) -> Body:
         BodyError: the stature gives no valid body.
     """
     thick, thin = _GIRTH
-    length = LEG * height
+    length = _leg() * height
     with naming(f"legs of a stature of {height} m", BodyError):
         shape = TaperedEllipticCylinder(length, thick, thick, thin, thin)
     limbs: list[Any] = [("pelvis", None, TaperedEllipticCylinder(0.10, 0.03, 0.03, 0.03, 0.03), None, (False, False))]
     sites = []
-    for side, y in (("l", HALF_WIDTH * height), ("r", -HALF_WIDTH * height)):
+    beside = _half_width() * height
+    for side, y in (("l", beside), ("r", -beside)):
         hip = Joint(name=f"{side}_hip", on_parent=Place(position=(0.0, y, 0.0), rotation=(math.pi, 0.0, 0.0)))
         limbs.append((f"{side}_leg", "pelvis", shape, hip.parts(), (False, False)))
         sites += [(f"{side}_{name}", f"{side}_leg", (0.0, 0.0, z)) for name, z in (("hip", 0.0), ("ankle", length))]

@@ -18,7 +18,7 @@ from voodoo.drawing.surfaces import Canvas, Log
 from voodoo.measurements import DepthImage, FloatArray
 from voodoo.people import Followed
 from voodoo.sensors.gating import SiteGate
-from voodoo.sensors.model import RangeNoise
+from voodoo.sensors.model import TYPICAL_RANGE_M, RangeNoise
 from voodoo.sensors.rays import SiteRay, add_rays, agreed
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker
@@ -27,7 +27,6 @@ M = TypeVar("M")
 T = TypeVar("T")
 
 
-_TYPICAL_RANGE_M = 3.0
 NOBODY = 0
 """Key of the part of a measurement that belongs to none of the tracked persons, see `Adapter.shares`."""
 _WRONG_M = 0.5
@@ -103,9 +102,7 @@ class Context:
 
     def add_rays(self, frame: Frame) -> list[SiteRay]:
         """Add the collected rays to a frame; returns them with the trust by which they agree."""
-        rays, scale = self.rays, self.settings.agreement
-        if scale > 0.0:
-            rays = agreed(rays, predicted=self.predicted, scale=scale)
+        rays = agreed(self.rays, predicted=self.predicted)
         add_rays(frame, rays, model=self.settings.model)
         return rays
 
@@ -130,7 +127,7 @@ class Context:
         if noise is None:
             return 1.0
         if not self.predicted:
-            return self.settings.model.weight(noise.sigma(_TYPICAL_RANGE_M), sharing=sharing)
+            return self.settings.model.weight(noise.sigma(TYPICAL_RANGE_M), sharing=sharing)
         # For a few numbers plain Python is faster than arrays.
         sums = map(sum, zip(*(place.tolist() for place in self.predicted.values()), strict=True))
         body = [value / len(self.predicted) for value in sums]

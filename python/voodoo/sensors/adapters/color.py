@@ -12,13 +12,12 @@ import numpy as np
 from voodoo._core import Frame
 from voodoo.drawing.surfaces import Canvas
 from voodoo.measurements import ByteImage, ColorImage
+from voodoo.recordings.together import FARTHEST_S
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
 from voodoo.sensors.pinhole import Pinhole
 from voodoo.sensors.silhouettes.regions import LIKELY
 from voodoo.tracker import Tracker
 
-_FARTHEST_S = 0.25
-"""Greatest time between an image and its frame [s]; beyond it the pose differs, and the tracker would reject the frame."""
 _INK = (90, 240, 250)
 _GRAY = 2
 """Greatest difference between the channels of a gray camera's image, from compression."""
@@ -55,7 +54,7 @@ class ColorAdapter(Adapter[ColorImage]):
 
     def add(self, frame: Frame, item: ColorImage, context: Context) -> None:
         """As a picture with its own stamp; the first one of a camera after pictures of the empty scene, if there are some."""
-        if not isinstance(context.tracker, Tracker) or abs(item.stamp - context.stamp) > _FARTHEST_S:
+        if not isinstance(context.tracker, Tracker) or abs(item.stamp - context.stamp) > FARTHEST_S:
             return
         known = context.memory.all(self.kind).get(item.sensor)
         if known is None or known.lens.original != item.camera or known.tracker is not context.tracker:

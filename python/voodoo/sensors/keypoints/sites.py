@@ -27,6 +27,8 @@ from voodoo.sensors.rays import SiteRay, add_rays
 
 EDGE_M = 0.10
 """Depths in a window that differ by more than this belong to different surfaces."""
+WINDOW_PX = 5
+"""Side of the window around a keypoint in which the nearest surface is searched for."""
 
 
 BEHIND_SURFACE_M: dict[str, float] = {
@@ -43,9 +45,7 @@ def behind_surface(site: str) -> float:
     return BEHIND_SURFACE_M[site.removeprefix("l_").removeprefix("r_")]
 
 
-def window_depth(
-    depth: DepthArray, pixel: tuple[float, float], *, meters_per_unit: float = 0.001, radius: int = 2
-) -> float | None:
+def window_depth(depth: DepthArray, pixel: tuple[float, float], *, meters_per_unit: float = 0.001) -> float | None:
     """Depth [m] of the nearest surface around a pixel, None where fewer than a quarter of the window's pixels returned.
 
     The nearest surface is what lies within EDGE_M behind the window's 20 % quantile; its median is robust against
@@ -55,6 +55,7 @@ def window_depth(
     height, width = depth.shape
     if not (0 <= u < width and 0 <= v < height):
         return None
+    radius = WINDOW_PX // 2
     window = depth[max(v - radius, 0) : v + radius + 1, max(u - radius, 0) : u + radius + 1]
     values = window.astype(np.float64).ravel() * meters_per_unit
     values = values[np.isfinite(values) & (values > 0.0)]

@@ -11,6 +11,8 @@ import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
 from voodoo.measurements import FloatArray
+from voodoo.model.at_rest import proportion
+from voodoo.model.body import STATURE_M
 from voodoo.model.camera import Camera
 from voodoo.model.joint import numbers_of
 from voodoo.model.projection import CameraView
@@ -55,19 +57,15 @@ _TRUNK = {"l_shoulder", "r_shoulder", "l_hip", "r_hip"}
 
 
 _LIMBS = tuple(
-    (f"{side}_{first}", f"{side}_{middle}", f"{side}_{last}", fraction)
+    (f"{side}_{first}", f"{side}_{middle}", f"{side}_{last}")
     for side in "lr"
-    for first, middle, last, fraction in (
-        ("shoulder", "elbow", "wrist", 0.332),
-        ("shoulder", "elbow", "hand", 0.377),
-        ("hip", "knee", "ankle", 0.491),
-    )
+    for first, middle, last in (("shoulder", "elbow", "wrist"), ("shoulder", "elbow", "hand"), ("hip", "knee", "ankle"))
 )
-"""Joints of arms and legs, and their length as a fraction of the stature (Winter, fig. 4.1)."""
+"""Joints of arms and legs."""
 
 
 def surroundings(
-    known: Mapping[str, FloatArray], camera: Camera, root_from_sensor: FloatArray, *, height: float = 1.75
+    known: Mapping[str, FloatArray], camera: Camera, root_from_sensor: FloatArray, *, height: float = STATURE_M
 ) -> Mask:
     """Mask (height, width) of the pixels where the person may be, given known sites.
 
@@ -101,14 +99,15 @@ def surroundings(
         cv2.polylines(mask, [hull], True, 1, max(round(2.0 * by * scale), 1))
 
     rest = set(ends)
-    for first, middle, last, fraction in _LIMBS:
+    for first, middle, last in _LIMBS:
         if first in ends and middle in ends and last in ends:
             widened([first, middle], _GIRTH_M)
             widened([middle, last], _GIRTH_M)
             rest -= {middle, last}
         elif first in ends and last in ends:
             straight = float(np.linalg.norm(places[first] - places[last]))
-            bend = 0.5 * float(np.sqrt(max((fraction * height) ** 2 - straight**2, 0.0)))
+            length = proportion(first, middle, last) * height
+            bend = 0.5 * float(np.sqrt(max(length**2 - straight**2, 0.0)))
             widened([first, last], bend + _GIRTH_M)
             rest.discard(last)
     if rest:
