@@ -70,9 +70,7 @@ class ConfigFields(BaseModel, frozen=True, extra="forbid"):
     kernel_end: float = 0.015
     """Final scale of the robust kernel, for the whole-body solvers. (unit: m; range: 0.001 to 10)"""
     depth_contour_sigma: float = 0.01
-    """Standard deviation of an edge of the depth contour, for the whole-body solvers. (unit: m; range: 0.0001 to
-    1)
-    """
+    """Standard deviation of an edge of the depth contour. (unit: m; range: 0.0001 to 1)"""
     prediction: float = 0.6
     """Fraction of the last motion that is extrapolated (0: the body is expected to stand still; whole-body
     solvers). (range: 0 to 1)
@@ -100,7 +98,7 @@ class ConfigFields(BaseModel, frozen=True, extra="forbid"):
     depth_contour: bool = True
     """Match the rims of limbs to the depth contour, in the later steps of a frame (whole-body solvers)."""
     regions: bool = True
-    """Match the contours of limbs to the color contours in color images (whole-body solvers)."""
+    """Find the contours of limbs in color images; whole-body solvers match them."""
     facing: bool = True
     """Match depth pixels inside a limb to the side that faces their camera (whole-body solvers)."""
     limits: bool = True

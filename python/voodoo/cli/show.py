@@ -58,11 +58,11 @@ def body_command(
     model: options.ModelOption = None,
 ) -> None:
     """Print a body as TOML: the default human of a stature, or a file after checking it."""
-    from voodoo.model.body import Body
+    from voodoo.model.body import STATURE_M, Body
 
     refuse_both("FILE", file, **{"--height": height, "--model": model})
     if file is not None:
         body = Body.load(file)
     else:
-        body = Body.human(1.75 if height is None else height, model=model or "measured")
+        body = Body.human(STATURE_M if height is None else height, model=model or "measured")
     typer.echo(body.to_toml(), nl=False)

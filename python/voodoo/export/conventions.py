@@ -23,6 +23,8 @@ Color: TypeAlias = dict[str, float]
 _LEFT: Color = {"r": 0.9, "g": 0.6, "b": 0.3, "a": 0.6}
 _RIGHT: Color = {"r": 0.3, "g": 0.6, "b": 0.9, "a": 0.6}
 JOINT_COLOR: Color = {"r": 0.9, "g": 0.1, "b": 0.1, "a": 0.6}
+JOINT_M = 0.04
+"""Diameter of the marker of a joint."""
 
 
 def limb_color(limb: str) -> Color:

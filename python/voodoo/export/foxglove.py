@@ -11,7 +11,7 @@ from typing import Any
 
 import voodoo._core as _core
 from voodoo.errors import VoodooError, installed
-from voodoo.export.conventions import JOINT_COLOR, limb_color
+from voodoo.export.conventions import JOINT_COLOR, JOINT_M, limb_color
 from voodoo.export.human_frames import placed_names
 from voodoo.export.layout import FoxgloveAbout, rows_of
 from voodoo.export.skeleton import FloatArray
@@ -24,7 +24,6 @@ from voodoo.whole import appearing_whole
 SUFFIX = ".foxglove.mcap"
 TRANSFORMS, SCENE = "/tf", "/people"
 """Topics: foxglove.FrameTransforms and foxglove.SceneUpdate."""
-_JOINT_M = 0.04
 
 
 def library(needed_by: object) -> ModuleType:
@@ -84,7 +83,7 @@ class Channels:
         """Messages of persons: transforms, if somebody is there, and the scene."""
         m = self._messages
         time = m.Timestamp(*divmod(STAMP_NS, 1_000_000_000))
-        size, red = m.Vector3(x=_JOINT_M, y=_JOINT_M, z=_JOINT_M), m.Color(**JOINT_COLOR)
+        size, red = m.Vector3(x=JOINT_M, y=JOINT_M, z=JOINT_M), m.Color(**JOINT_COLOR)
         before = m.SceneEntityDeletion(timestamp=time, type=m.SceneEntityDeletionType.All)
 
         def transform(parent: str, name: str, row: list[float]) -> Any:  # noqa: ANN401

@@ -23,7 +23,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
-from voodoo.export.conventions import JOINT_COLOR, Color, limb_color
+from voodoo.export.conventions import JOINT_COLOR, JOINT_M, Color, limb_color
 from voodoo.export.human_frames import placed_names
 from voodoo.export.layout import rows_of
 from voodoo.export.skeleton import FloatArray, ellipsoids
@@ -281,7 +281,7 @@ def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  #
         size = (limb.shape.a0 + limb.shape.a1, limb.shape.b0 + limb.shape.b1, limb.shape.length)
         add("limbs", _CYLINDER, (*middle, *turns[number]), size, limb_color(limb.name), id=number)
     points = [_geometry("Point", position) for position in track.joints[index].tolist()]
-    add("joints", _SPHERES, (*[0.0] * 6, 1.0), (0.04,) * 3, JOINT_COLOR, points=points)
+    add("joints", _SPHERES, (*[0.0] * 6, 1.0), (JOINT_M,) * 3, JOINT_COLOR, points=points)
     known = np.isfinite(track.covariance[index]).all(axis=(1, 2)).nonzero()[0]
     sizes, axes = ellipsoids(track.covariance[index][known])
     for number, turn, size in zip(known.tolist(), axes, 2.0 * sizes, strict=True):

@@ -16,6 +16,7 @@ from voodoo.live.source import Arrival, Faults
 from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.model.camera import Camera
 from voodoo.pipeline.frozen import unchanged
+from voodoo.pipeline.pairing import WAIT_S
 from voodoo.recordings.recording import refuse_blank
 
 GAP_S = 1.0
@@ -114,8 +115,6 @@ class HostTime:
         self._offset = None
 
 
-WAIT_S = 0.010
-"""How long a depth image waits for its color image or transform, as in recordings."""
 _STALE_S = 0.5
 """A measurement that is older than its frame by more does not belong to it."""
 _PENDING = 4

@@ -17,7 +17,7 @@ from voodoo.errors import VoodooError, a_path
 from voodoo.export.skeleton import bones
 from voodoo.export.table import SUFFIXES
 from voodoo.export.track import Track
-from voodoo.model.body import Body
+from voodoo.model.body import STATURE_M, Body
 from voodoo.model.joint import number_of, short, valid
 from voodoo.names import Automatic, HumanModel
 from voodoo.people import People
@@ -32,8 +32,6 @@ from voodoo.sensors.settings import inputs_for, inputs_in
 from voodoo.stored import MOST_METADATA, read_stored
 from voodoo.tracker import Tracker
 
-_DEFAULT_M = 1.75
-"""Stature of `Body.human()`."""
 _AGES = (1.0, 2.0, 4.0, 8.0, 12.0, 15.0, 18.0)
 _STATURES_M = (0.75, 0.87, 1.03, 1.27, 1.50, 1.65, 1.70)
 """Median stature at these ages in years, mean of girls and boys (WHO Child Growth Standards, 2006; growth reference, 2007)."""
@@ -269,7 +267,7 @@ def stature(body: Body) -> float | None:
         return None
     turns = body.core.at_rest()[0]  # models with the same limbs differ in these, which sizes hardly change
     human = min(humans, key=lambda one: float(np.abs(one.core.at_rest()[0] - turns).sum()))
-    return round(_DEFAULT_M * _upright(body) / _upright(human), 3)
+    return round(STATURE_M * _upright(body) / _upright(human), 3)
 
 
 def _upright(body: Body) -> float:

@@ -52,6 +52,11 @@ def stamp_of(message: Message, source: str) -> float:
     if not (0 <= stamp.nanosec < 1_000_000_000 and stamp.sec >= 0):
         found = f"{stamp.sec} s {stamp.nanosec} ns"
         raise RecordingError(f"{source}: expected a header stamp, found {found}", reason="without a stamp")
+    return seconds(stamp)
+
+
+def seconds(stamp: Any) -> float:  # noqa: ANN401 - rosbags has no class for it
+    """A builtin_interfaces/Time in seconds."""
     return float(stamp.sec) + float(stamp.nanosec) * 1e-9
 
 

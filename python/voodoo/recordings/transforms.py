@@ -13,7 +13,7 @@ from voodoo.errors import RecordingError
 from voodoo.measurements import FloatArray
 from voodoo.model.rotations import matrix_of_quaternion, turned_between
 from voodoo.model.transforms import inverse, pose_of
-from voodoo.recordings.ros_messages import Message
+from voodoo.recordings.ros_messages import Message, seconds
 from voodoo.recordings.set_back import SetBack
 
 WAVERS_M, WAVERS_RAD = 0.05, math.radians(2.0)
@@ -111,7 +111,7 @@ class TransformTree:
             where = f"{self.source}: transform {parent!r} from {child!r}"
             if not parent or not child or parent == child:
                 raise RecordingError(f"{where}: expected two different frame names")
-            stamp = float(item.header.stamp.sec) + float(item.header.stamp.nanosec) * 1e-9
+            stamp = seconds(item.header.stamp)
             transform = matrix(item.transform.translation, item.transform.rotation, where)
             moved = stamp if static or self._set_back is None else self._set_back.of(f"{parent} {child}", stamp)
             if moved is not None:

@@ -21,6 +21,7 @@ from voodoo.recordings.ros_messages import (
     frame_of,
     is_depth,
     measured,
+    seconds,
     stamp_of,
 )
 from voodoo.recordings.ros_topics import CAMERA_INFO, CLOUD, COMPRESSED, IMAGES, MEASURED, SCAN, info_topic
@@ -121,7 +122,7 @@ class RosFeed:
 
     def _take_transforms(self, message: Message, *, static: bool) -> None:
         for item in message.transforms:
-            stamp = float(item.header.stamp.sec) + float(item.header.stamp.nanosec) * 1e-9
+            stamp = seconds(item.header.stamp)
             if not static:
                 if stamp < self._newest - _JUMP_S:
                     self._tree.keep(stamp - _KEPT_S, stamp)  # later transforms are in the future
