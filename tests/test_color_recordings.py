@@ -1,5 +1,6 @@
 """Recordings of pictures alone: bags with several color topics, folders of videos, pictures of the empty scene."""
 
+import json
 import shutil
 from dataclasses import replace
 
@@ -10,12 +11,12 @@ import pytest
 import color_scene as scene
 from bag_writer import write_bag
 from voodoo.errors import RecordingError
-from voodoo.measurements import ColorImage
+from voodoo.measurements import ColorImage, KeypointImage
 from voodoo.model.camera import Camera
 from voodoo.pipeline.pairing import paired
 from voodoo.recordings import open_recording
 from voodoo.recordings.empty_scene import pictures_of
-from voodoo.recordings.joined import Joined
+from voodoo.recordings.joined import Joined, WithKeypoints
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.together import together
 from voodoo.sensors.pinhole import Pinhole
@@ -265,6 +266,23 @@ def test_image_folders(copy):
         RecordingError, match=r"images/cam_1: expected a number or stamp for each picture, found one twice"
     ):
         open_recording(copy)
+
+
+def test_keypoints_of_a_faster_camera_stay_with_their_pictures(tmp_path):
+    """Every second picture of the faster camera is in no frame."""
+    (tmp_path / "Calib_scene.toml").write_text(scene.calibration(2))
+    blank, files = np.zeros((scene.CAMERA.height, scene.CAMERA.width, 3), np.uint8), tmp_path / "files"
+    for n in range(2):
+        scene.write_video(tmp_path / "videos" / f"cam{n}.avi", [blank] * 4 * (n + 1), scene.RATE * (n + 1))
+    files.mkdir()
+    for k in range(8):
+        person = {"pose_keypoints_2d": [100.0 + k, 50.0, 0.9] * 17}
+        (files / f"{k}.json").write_text(json.dumps({"people": [person]}))
+    for left_out in (None, LeftOut()):
+        recording = open_recording(tmp_path, left_out=left_out)
+        joined = WithKeypoints(recording, {"videos/cam1.avi": files}, layout="coco17", left_out=left_out)
+        found = [item for frame in joined for item in frame.measurements if isinstance(item, KeypointImage)]
+        assert [item.people[0][0, 0] for item in found] == [100.0, 102.0, 104.0, 106.0]
 
 
 def test_a_video_of_another_size_and_one_that_is_damaged(copy):

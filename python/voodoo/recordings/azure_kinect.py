@@ -73,6 +73,7 @@ class AzureKinectRecording(Recording):
         """Read the tracks, the calibration and the stamps; see the class."""
         self.path, self.name, self.root_frame = path, path.stem, FRAME
         self._left_out = left_out
+        self.numbers: dict[tuple[str, float], int] = {}
         with reading(path, _EXPECTED), _opened(path) as film:
             tags = {word: value for word, value in film.metadata.items() if word.startswith("K4A_")}
             tracks: dict[str, tuple[int, str]] = {}
@@ -125,7 +126,7 @@ class AzureKinectRecording(Recording):
                     continue
                 number += 1
                 make = partial(self._depth_image, stamp, bytes(packet))
-                if item := usable(make, number, f"{self.path}, depth", self._left_out):
+                if item := usable(make, number, f"{self.path}, depth", self._left_out, self.numbers):
                     yield item
 
     def _depth_image(self, stamp: float, content: bytes) -> DepthImage:

@@ -94,6 +94,7 @@ class FolderRecording(Recording):
         self.path = path
         self.name = path.resolve().name
         self._left_out = left_out
+        self.numbers: dict[tuple[str, float], int] = {}
         rate = None if rate is None else number_option(path, "rate", rate, "images per second > 0", most=1e4)
         clock = FrameClock(rate)
         set_back = SetBack()
@@ -119,11 +120,13 @@ class FolderRecording(Recording):
         color = self._calibration.color
         colors: Iterator[Measurement] = (color_image(*entry, color) for entry in self._color if color is not None)
         depths: Iterator[Measurement] = (
-            item
-            for number, (stamp, file) in enumerate(self._depth)
-            if (item := usable(partial(depth_image, stamp, file, self._calibration), number, file, self._left_out))
+            item for number, (stamp, file) in enumerate(self._depth) if (item := self._usable(number, stamp, file))
         )
         return in_turn(heapq.merge(colors, depths, key=lambda item: item.stamp), "depth")
+
+    def _usable(self, number: int, stamp: float, file: Path) -> DepthImage | None:
+        make = partial(depth_image, stamp, file, self._calibration)
+        return usable(make, number, file, self._left_out, self.numbers)
 
     def _sensors(self) -> Iterator[SensorInfo]:
         yield _sensor("depth", "16-bit PNG", self._depth, self._calibration.depth)

@@ -38,7 +38,7 @@ class Around(Recording):
         """As the recording is."""
         self.path, self.name, self.root_frame = recording.path, recording.name, recording.root_frame
         self.start, self.reference, self.assumed = recording.start, recording.reference, recording.assumed
-        self.people, self.complete = recording.people, recording.complete
+        self.people, self.complete, self.numbers = recording.people, recording.complete, recording.numbers
         self._recording = recording
 
     def __len__(self) -> int:
@@ -209,10 +209,8 @@ class WithKeypoints(Around):
             items: list[Measurement] = []
             for item in recorded.measurements:
                 if isinstance(item, (ColorImage, DepthImage)) and count.get(item.sensor, -1) >= 0:
-                    number = count[item.sensor]
-                    if self._left_out is not None:
-                        # The numbers of images count those that were left out.
-                        number = self._left_out.numbers.get((item.sensor, item.stamp), number)
+                    # The numbers of images count those that are in no frame.
+                    number = self.numbers.get((item.sensor, item.stamp), count[item.sensor])
                     count[item.sensor] = number + 1
                     people = read_people(self._files[item.sensor][number], layout=self._layout, left_out=self._left_out)
                     items.append(KeypointImage.of(item, people, self._layout))

@@ -18,7 +18,6 @@ class LeftOut:
         counts: reason -> number.
         first: reason -> description of the first one.
         notes: what else to know, each once.
-        numbers: (sensor, stamp) -> index of that message among those of the sensor, for data that is paired by index.
     """
 
     def __init__(self) -> None:
@@ -26,7 +25,6 @@ class LeftOut:
         self.counts: dict[str, int] = {}
         self.first: dict[str, str] = {}
         self.notes: dict[str, None] = {}
-        self.numbers: dict[tuple[str, float], int] = {}
 
     def add(self, reason: str, words: object, count: int = 1) -> None:
         """Count measurements that were left out.

@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import TypedDict, TypeVar
 
 import numpy as np
@@ -157,6 +158,8 @@ class Recording(ABC):
         loader: which loader reads it.
         people: exact positions of all persons, if the recording has such a truth, or None.
         complete: whether each frame holds all measurements of its time, so that none of the next frame belongs to it.
+        numbers: (sensor, stamp) -> index of that image among those of the sensor, for data that is paired by index, where some
+            images may be in no frame; those that were read so far.
     """
 
     assumed: tuple[str, ...] = ()
@@ -167,6 +170,7 @@ class Recording(ABC):
     reference: Reference | None = None
     people: PeopleTruth | None = None
     complete: bool = False
+    numbers: Mapping[tuple[str, float], int] = MappingProxyType({})
     loader: str
     _stamps: Sequence[float] | FloatArray
     _unused: Sequence[tuple[str, str]] = ()
@@ -259,18 +263,24 @@ def refuse_blank(item: DepthImage, where: object) -> None:
         )
 
 
-def usable(make: Callable[[], M], number: int, where: object, left_out: LeftOut | None) -> M | None:
-    """A measurement by its number; of a damaged recording, in which also blank depth images are left out, None for one that is.
+def usable(
+    make: Callable[[], M],
+    number: int,
+    where: object,
+    left_out: LeftOut | None,
+    numbers: dict[tuple[str, float], int],
+) -> M | None:
+    """A measurement, whose number becomes known; of a damaged recording, in which also blank depth images are left out, None for
+    one that is.
 
     Raises:
         RecordingError: without `left_out`, that of `make`.
     """
     with leaving_out(left_out):
         item = make()
-        if left_out is not None:
-            if isinstance(item, DepthImage):
-                refuse_blank(item, where)
-            left_out.numbers[item.sensor, item.stamp] = number
+        if left_out is not None and isinstance(item, DepthImage):
+            refuse_blank(item, where)
+        numbers[item.sensor, item.stamp] = number
         return item
     return None
 

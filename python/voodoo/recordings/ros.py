@@ -89,6 +89,7 @@ class RosRecording(Recording):
         self._left_out = left_out
         if unpacked_gb is not None:
             unpacked_gb = number_option(path, "unpacked_gb", unpacked_gb, "gigabytes > 0", most=1e6)
+        self.numbers: dict[tuple[str, float], int] = {}
         self._bag = Bag(path, left_out=left_out, unpacked=None if unpacked_gb is None else int(unpacked_gb * 1e9))
         self.loader = "ros2" if self._bag.is_ros2 else "ros1"
         choices = dict(zip(TOPIC_KINDS, (depth_topic, points_topic, scan_topic, color_topic), strict=True))
@@ -141,7 +142,7 @@ class RosRecording(Recording):
             numbers[topic] += 1
             make = partial(self._measured, topic, message, last, clock)
             where = f"{self.path}, topic {topic}"
-            if message is not None and (item := usable(make, numbers[topic], where, self._left_out)):
+            if message is not None and (item := usable(make, numbers[topic], where, self._left_out, self.numbers)):
                 last[topic] = item.stamp
                 if self._left_out is not None:
                     self._left_out.notes |= dict.fromkeys(clock.words)

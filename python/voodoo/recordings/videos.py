@@ -231,6 +231,7 @@ class VideosRecording(Recording):
             else:
                 self._cameras.append(of_video(source, sensor, camera, rate))
         self._stamps = self._cameras[0].stamps
+        self.numbers = {(one.sensor, stamp): index for one in self._cameras for index, stamp in enumerate(one.stamps)}
         self.assumed = tuple(dict.fromkeys(clock.notes))
         names = {one.sensor: (one.camera, (one.placed.name, Path(one.sensor).stem)) for one in self._cameras}
         self._scene = EmptyScene(path, background, names)
