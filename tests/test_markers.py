@@ -82,6 +82,14 @@ def test_other_encodings_separators_and_units_of_a_trc_are_read(tmp_path, encode
     np.testing.assert_allclose(markers.positions[1], [[0.001, 0.002, 0.003], [0.004, 0.005, 0.006]])
 
 
+def test_a_missing_marker_between_spaces_is_refused(tmp_path):
+    """Its cells are nowhere, and the next marker would get its place."""
+    path = tmp_path / "x.trc"
+    path.write_bytes(in_spaces(TRC).replace(b"0.00 1 2 3 4 5 6", b"0.00 4 5 6"))
+    with pytest.raises(RecordingError, match="line 6: expected 8 columns, found 5"):
+        read_markers(path)
+
+
 def test_rows_that_are_missing_are_told(tmp_path):
     path = write_rows(tmp_path / "x.trc", *walking([1, 2, 0]))
     path.write_text(path.read_text().replace("50\t50\t3\t", "50\t50\t40\t"))

@@ -132,7 +132,8 @@ def read_trc(path: str | Path) -> MarkerTrajectories:
         cells = cells_of(line)
         while len(cells) > len(row) and not cells[-1]:
             cells.pop()
-        if len(cells) > len(row) or len(cells) < 2:
+        # Between spaces, nothing tells which columns are empty.
+        if len(cells) > len(row) or len(cells) < (2 if separator else len(row)):
             raise RecordingError(f"{path}, line {number}: expected {len(row)} columns, found {len(cells)}")
         row[: len(cells)] = numbers_in(f"{path}, line {number}", cells)
     stamps = table[:, 1].copy()
