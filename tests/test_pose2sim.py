@@ -5,6 +5,7 @@ import pytest
 
 from commands import refused, run
 from measurement_data import data_folder
+from test_keypoint_check import write_folder
 from voodoo.errors import RecordingError
 from voodoo.recordings import open_recording
 from voodoo.recordings.camera_files import read_camera_toml
@@ -136,6 +137,28 @@ def test_recording(folder):
         open_recording(folder, cameras=("cam_09",))
     with pytest.raises(RecordingError, match="17 keypoints"):
         next(iter(open_recording(folder, layout="coco17")))
+
+
+@pytest.mark.parametrize(
+    ("start", "since", "first"),
+    [(0, 1, 0), (0, 0, 0), (4, 1, 4), (4, 4, 4), (1, 0, 0), (40, 1, None)],
+    ids=["all", "newer", "part", "newer part", "counts from 1", "another recording"],
+)
+def test_a_triangulation_of_some_images_keeps_their_times(tmp_path, start, since, first):
+    """Pose2Sim writes its frame_range into the header; the time of the first row depends on its version."""
+    folder = write_folder(tmp_path, count=6)
+    header = ["DataRate", "NumFrames", "NumMarkers", "Units", "OrigDataStartFrame"]
+    rows = [[row + since, (row + since) / 60.0, row, 1.0, 2.0] for row in range(3)]
+    lines = [["PathFileType"], header, [60, 3, 1, "m", start], ["Frame#", "Time", "LWrist"], [], *rows]
+    (folder / "walk.trc").write_text("\n".join("\t".join(map(str, line)) for line in lines))
+    recording = open_recording(folder)
+    if first is None:
+        assert recording.reference is None
+        return
+    count = min(3, 6 - first)
+    np.testing.assert_allclose(recording.reference.stamps, (first + np.arange(count)) / 60.0)
+    np.testing.assert_allclose(recording.reference.positions[:, 0, 1], np.arange(count))
+    assert (recording.start is None) == (first > 0)
 
 
 def test_keypoint_files_of_which_none_can_be_read_are_an_error(tmp_path):

@@ -50,6 +50,7 @@ class MarkerTrajectories:
         up: the axis that points up, a key of Z_UP_FROM, if the file says so.
         right: the horizontal axis to the right of its screen, if the file says so.
         remarks: what is unusual about the file.
+        first: number of the original data's frame, from 0, that is the first one here, if the file says so.
     """
 
     stamps: FloatArray
@@ -59,6 +60,7 @@ class MarkerTrajectories:
     up: str | None = None
     right: str | None = None
     remarks: tuple[str, ...] = ()
+    first: int = 0
 
     def __repr__(self) -> str:
         """Counts and rate."""
@@ -140,7 +142,10 @@ def read_trc(path: str | Path) -> MarkerTrajectories:
     if not np.isfinite(stamps).all() or (np.diff(stamps) <= 0.0).any():
         raise RecordingError(f"{path}: expected rising times in the second column, found others")
     positions = table[:, 2:].reshape(len(rows), markers, 3) * unit
-    return MarkerTrajectories(stamps, _without_subject(names), _observed(positions), rate, remarks=remarks)
+    written = header.get("OrigDataStartFrame", "")
+    # Some programs count from 1: then the first time is 0.
+    first = int(written) if written.isdecimal() and len(written) < 10 and stamps[0] > 0.0 else 0
+    return MarkerTrajectories(stamps, _without_subject(names), _observed(positions), rate, remarks=remarks, first=first)
 
 
 def _meters(unit: str) -> float:

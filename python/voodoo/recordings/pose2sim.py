@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from voodoo.errors import MeasurementError, RecordingError, naming
-from voodoo.measurements import KeypointImage, RecordedFrame
+from voodoo.measurements import FloatArray, KeypointImage, RecordedFrame
 from voodoo.recordings.camera_files import PlacedCamera, read_camera_toml, tables_of
 from voodoo.recordings.keypoint_check import check_keypoints, some_of, taken_layout
 from voodoo.recordings.keypoint_files import read_people
@@ -17,7 +17,7 @@ from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_trc
 from voodoo.recordings.order import in_order, matched, numbers_of
-from voodoo.recordings.recording import Recording, Reference, SensorInfo, number_option
+from voodoo.recordings.recording import Recording, Reference, SensorInfo, Start, number_option
 
 SITES = {
     f"{side}{joint.capitalize()}": f"{side.lower()}_{joint}"
@@ -84,9 +84,9 @@ class Pose2SimRecording(Recording):
         self._files, self._notes = _rows_of(path, self._folders)
         self._stamps = np.arange(len(self._files)) / self.rate
         self._check(layout)
-        self.reference = None if bare else read_triangulation(path, self.rate)
+        self.reference = None if bare else read_triangulation(path, self._stamps)
         if self.reference is not None:
-            self.start = self.reference.as_start()
+            self.start = start_of(self.reference, self._stamps)
             kind = "the same keypoints: it tests consistency, not accuracy"
             self._notes = (*self._notes, f"the reference is triangulated from {kind}")
 
@@ -272,8 +272,13 @@ def calibration_of(path: Path, names: Sequence[str] = ()) -> Path:
     return found[0]
 
 
-def read_triangulation(path: Path, rate: float) -> Reference | None:
-    """The triangulated joints of a Pose2Sim folder, at stamps k / rate; None without any.
+def start_of(reference: Reference, stamps: Sequence[float] | FloatArray) -> Start | None:
+    """The first row of a reference, if it is of the first image."""
+    return reference.as_start() if reference.stamps[0] == stamps[0] else None
+
+
+def read_triangulation(path: Path, stamps: Sequence[float] | FloatArray) -> Reference | None:
+    """The triangulated joints of a Pose2Sim folder, whose images have these stamps [s]; None without any.
 
     Raises:
         RecordingError: a .trc that cannot be read.
@@ -281,6 +286,10 @@ def read_triangulation(path: Path, rate: float) -> Reference | None:
     files = sorted(path.glob("*.trc"), key=lambda file: (len(file.name), file.name))
     if not files:
         return None
-    names, positions = read_trc(files[0]).of(SITES)
-    # Rows are images; the file's own time starts at 1 / rate for image 0.
-    return Reference(np.arange(len(positions)) / rate, names, positions @ Z_UP_FROM_Y_UP.T, exact=False)
+    content = read_trc(files[0])
+    names, positions = content.of(SITES)
+    # Rows are images, from that one on at which the triangulation began; earlier versions' time starts at 1 / rate for it.
+    own = np.array(stamps[content.first :][: len(positions)], dtype=np.float64)
+    if not len(own):
+        return None
+    return Reference(own, names, positions[: len(own)] @ Z_UP_FROM_Y_UP.T, exact=False)

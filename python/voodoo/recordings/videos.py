@@ -20,7 +20,7 @@ from voodoo.recordings.folder import FrameClock
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.order import in_order
 from voodoo.recordings.pictures import decode_color, picture_size
-from voodoo.recordings.pose2sim import FRAME, calibration_of, cameras_of, read_triangulation
+from voodoo.recordings.pose2sim import FRAME, calibration_of, cameras_of, read_triangulation, start_of
 from voodoo.recordings.recording import Recording, SensorInfo, number_option
 from voodoo.recordings.together import together
 from voodoo.recordings.truth import find_beside, read_beside
@@ -239,10 +239,10 @@ class VideosRecording(Recording):
             return
         read_beside(self, partial(find_beside, path), root=FRAME)
         if self.reference is None:
-            self.reference = read_triangulation(path, self.info().rate_hz)
+            self.reference = read_triangulation(path, self._stamps)
         if self.reference is not None and not self.reference.exact:
             self._notes = ("the reference is triangulated from keypoints: another tracker's opinion",)
-            self.start = self.start or self.reference.as_start()
+            self.start = self.start or start_of(self.reference, self._stamps)
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         """Images of all cameras; see Recording."""
