@@ -83,7 +83,7 @@ def test_a_start_beyond_all_numbers_is_refused(tmp_path, number):
     file = tmp_path / "init.json"
     file.write_text(json.dumps({"joints": {"l_wrist": [number, 0.0, 0.0]}}))
     with pytest.raises(RecordingError, match=r"init\.json: joints\.l_wrist\.0: .*finite number"):
-        read_start(file, lambda frame: np.eye(4))
+        read_start(file, lambda frame: np.eye(4), first=0.0)
     with pytest.raises(VoodooError, match=r"init\.json: joints\.l_wrist\.0: .*finite number"):
         Init.load(file)
 

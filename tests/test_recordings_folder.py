@@ -1,11 +1,14 @@
 """Folders of images with a calibration file."""
 
+import json
+
 import cv2
 import numpy as np
 import pytest
 
 import voodoo
 from voodoo.errors import RecordingError
+from voodoo.pipeline.start import Init
 from voodoo.recordings import ColorImage, DepthImage, open_recording
 
 CALIBRATION = """\
@@ -212,6 +215,13 @@ def test_truth_and_start_beside_the_images_are_read_unless_nothing_beside_is(fol
     assert "exact" in recording.info().reference
     bare = open_recording(folder, bare=True)
     assert bare.reference is None and bare.start is None
+    start = {"joints": {"l_wrist": [1.0, 2.0, 3.0]}, "stamp_s": recording.info().start_stamp}
+    (folder / "init.json").write_text(json.dumps(start))
+    assert open_recording(folder).start == {"joints": {"l_wrist": (1.0, 2.0, 3.0)}}
+    (folder / "init.json").write_text(json.dumps({**start, "stamp_s": start["stamp_s"] + 2.0}))
+    with pytest.raises(RecordingError, match=r"init\.json: expected the pose in the first frame.*--init FILE takes it"):
+        open_recording(folder)
+    assert Init.load(folder / "init.json").stamp_s == start["stamp_s"] + 2.0
     (folder / "truth.csv").write_text("nothing\n")
     open_recording(folder, bare=True)
     with pytest.raises(RecordingError, match=r"truth\.csv"):

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, TypeAlias, get_args
 
 import numpy as np
-from pydantic import ConfigDict, Field, FiniteFloat
+from pydantic import ConfigDict, Field
 
 from voodoo._core import Estimate
 from voodoo.config import Config
@@ -54,7 +54,6 @@ class Init(FirstPose):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    stamp_s: FiniteFloat | None = None
     format_version: Annotated[int, Field(ge=1, le=1)] = 1
 
     @classmethod

@@ -106,7 +106,12 @@ class FolderRecording(Recording):
         self._calibration = read_calibration(file, like=self._depth[0][1])
         self.root_frame = self._calibration.root_frame
         if not bare:
-            read_beside(self, lambda name: path / name if (path / name).is_file() else None, root=self.root_frame)
+            read_beside(
+                self,
+                lambda name: path / name if (path / name).is_file() else None,
+                root=self.root_frame,
+                first=self._stamps[0],
+            )
         self._color: list[tuple[float, Path]] = []
         if (path / "rgb").is_dir() or (path / "rgb.txt").is_file():
             if self._calibration.color is None:

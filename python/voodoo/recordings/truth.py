@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import BaseModel, Field, FiniteFloat
 
 from voodoo.errors import RecordingError, columns_in, reading
-from voodoo.measurements import FloatArray
+from voodoo.measurements import ROUNDED_S, FloatArray
 from voodoo.model.joint import valid
 from voodoo.model.projection import transform
 from voodoo.recordings.left_out import LeftOut
@@ -42,6 +42,7 @@ class FirstPose(BaseModel):
     height_m: Annotated[FiniteFloat, Field(gt=0.3, lt=3.0)] | None = None
     frame: str | None = None
     joints: Annotated[dict[str, tuple[FiniteFloat, FiniteFloat, FiniteFloat]], Field(min_length=1)]
+    stamp_s: FiniteFloat | None = None
 
     def moved(self, pose: FloatArray) -> dict[str, tuple[float, float, float]]:
         """The joints in another frame, by the transform (4, 4) to it."""
@@ -87,7 +88,7 @@ def read_beside(
     find: Callable[[str], Path | None],
     *,
     root: str,
-    first: float = 0.0,
+    first: float,
     left_out: LeftOut | None = None,
 ) -> None:
     """Set the reference, the persons and the start of a recording by the files beside it.
@@ -111,7 +112,7 @@ def read_beside(
             elif file is not None and name == PEOPLE_TRUTH_FILE:
                 recording.people = read_people_truth(file, own)
             elif file is not None:
-                recording.start = read_start(file, lambda frame: recording.root_from(frame or root, first))
+                recording.start = read_start(file, lambda frame: recording.root_from(frame or root, first), first=first)
         except RecordingError as error:
             if left_out is None:
                 raise
@@ -167,15 +168,20 @@ def read_people_truth(path: Path, root_from_truth: RootFromTruth) -> PeopleTruth
     return PeopleTruth(stamps, persons, in_view, names, positions)
 
 
-def read_start(path: Path, root_from: RootFromStart) -> Start:
+def read_start(path: Path, root_from: RootFromStart, *, first: float) -> Start:
     """Read an init.json: {"height_m": stature, "frame": name, "joints": {name: [x, y, z]}}; height and frame are optional.
 
     Raises:
-        RecordingError: not JSON, another format, or a frame without a transform.
+        RecordingError: not JSON, another format, a frame without a transform, or a pose of a later time than `first` [s].
     """
     content = read_stored_text(path, "a JSON file", most=MOST_METADATA)
     with valid(path, RecordingError, most=1):
         written = FirstPose.model_validate_json(content, strict=True)
+    if written.stamp_s is not None and written.stamp_s > first + ROUNDED_S:
+        raise RecordingError(
+            f"{path}: expected the pose in the first frame, at {first:.6f} s, found one at {written.stamp_s:.6f} s; --init FILE "
+            "takes it"
+        )
     start = Start(joints=written.moved(root_from(written.frame)))
     if written.height_m is not None:
         start["height_m"] = written.height_m

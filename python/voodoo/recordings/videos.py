@@ -237,7 +237,7 @@ class VideosRecording(Recording):
         self._scene = EmptyScene(path, background, names)
         if bare:
             return
-        read_beside(self, partial(find_beside, path), root=FRAME)
+        read_beside(self, partial(find_beside, path), root=FRAME, first=self._stamps[0])
         if self.reference is None:
             self.reference = read_triangulation(path, self._stamps)
         if self.reference is not None and not self.reference.exact:
