@@ -307,3 +307,18 @@ def test_a_calibration_in_yaml(folder, text):
     camera = item.camera
     assert (camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy) == (4, 3, 5.0, 5.5, 1.5, 1.0)
     assert camera.distortion[0] == 0.1 and item.meters_per_unit == 0.001
+
+
+@pytest.mark.parametrize(
+    ("written", "model"),
+    [("fisheye", "equidistant"), ("kannala_brandt4", "equidistant"), ("radtan", "plumb_bob"), ("omni", None)],
+)
+def test_a_lens_in_yaml_is_the_one_it_names(folder, written, model):
+    (folder / "calibration.toml").unlink()
+    text = ROS_YAML.replace("plumb_bob", written).replace("cols: 5", "cols: 4").replace("0.0, 0.0]}", "0.0]}")
+    (folder / "camera.yaml").write_text(text)
+    if model is None:
+        with pytest.raises(RecordingError, match=r"camera\.yaml, \[depth\]: .*model.*omni"):
+            open_recording(folder)
+    else:
+        assert next(iter(open_recording(folder))).measurements[0].camera.model == model

@@ -19,12 +19,13 @@ CameraModel = Literal["plumb_bob", "rational_polynomial", "equidistant", "invers
 (and optionally thin prism and tilt, in OpenCV's order), and Kannala-Brandt (k1 k2 k3 k4 on the angle); and Brown-Conrady
 from distorted to undistorted coordinates, the calibration of RealSense's color cameras."""
 
-_ALIASES = {
-    "": "plumb_bob", "none": "plumb_bob", "fisheye": "equidistant", "kannala_brandt4": "equidistant",
+LENS_NAMES = {
+    "": "plumb_bob", "none": "plumb_bob", "radtan": "plumb_bob", "fisheye": "equidistant", "kannala_brandt4": "equidistant",
     # librealsense's; its modified model differs by products of the radial and the tangential part only
     "None": "plumb_bob", "Brown Conrady": "plumb_bob", "Modified Brown Conrady": "plumb_bob",
     "Inverse Brown Conrady": "inverse_plumb_bob", "Kannala Brandt4": "equidistant",
 }  # fmt: skip
+"""Other names of lens models."""
 MOST_PIXELS = 2**25
 """Maximum number of pixels: those of an 8K image. Larger sizes are errors; the core has the same limit."""
 
@@ -107,7 +108,7 @@ class Camera:
             projection = _numbers("camera p", p, count=12)
             if projection[0] > 0.0:  # an all-zero P means "not filled in"
                 return cls(width, height, projection[0], projection[5], projection[2], projection[6])
-        name = _ALIASES.get(model, model)
+        name = LENS_NAMES.get(model, model)
         d = _numbers("camera d", d)
         coefficients = () if model in ("", "none") and not any(d) else d
         return cls(width, height, k[0], k[4], k[2], k[5], coefficients, name)  # type: ignore[arg-type]

@@ -16,7 +16,7 @@ from ruamel.yaml import YAML
 
 from voodoo.errors import CameraError, RecordingError, naming, reading
 from voodoo.measurements import FloatArray
-from voodoo.model.camera import Camera
+from voodoo.model.camera import LENS_NAMES, Camera
 from voodoo.model.joint import Strict, numbers_or_nan, short, valid
 from voodoo.model.toml_io import parse_toml, read_text
 from voodoo.model.transforms import is_rigid, pose_of
@@ -73,7 +73,7 @@ def tables_of(path: Path) -> dict[str, dict[str, Any]]:
 
 
 def camera_of(where: str, table: dict[str, Any]) -> Camera:
-    """The camera of a table, by its `size`, `matrix`, `distortions` and `fisheye`.
+    """The camera of a table, by its `size`, `matrix`, `distortions`, and `fisheye` or `distortion_model`.
 
     Raises:
         RecordingError: invalid numbers; `where` begins the message.
@@ -83,8 +83,10 @@ def camera_of(where: str, table: dict[str, Any]) -> Camera:
         raise RecordingError(f"{where}, matrix: expected no skew and a last row 0 0 1, found {matrix.tolist()}")
     width, height = (round(float(value)) for value in size)
     lens = tuple(_numbers(where, table, "distortions", None).tolist())
-    fisheye = table.get("fisheye", False) is True
-    model: Any = "equidistant" if fisheye else "plumb_bob" if len(lens) < 8 else "rational_polynomial"
+    named = "fisheye" if table.get("fisheye", False) is True else str(table.get("distortion_model") or "")
+    model: Any = LENS_NAMES.get(named, named)
+    if model in ("plumb_bob", "rational_polynomial"):
+        model = "plumb_bob" if len(lens) < 8 else "rational_polynomial"
     with naming(where, CameraError, error=RecordingError):
         return Camera(width, height, matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], lens, model)
 
@@ -153,7 +155,7 @@ def _table(name: str, row: Mapping[str, Any]) -> dict[str, Any]:
     lens: object = next((row[key] for key in ("distortion_coefficients", "D") if key in row), [])
     width, height = (row.get(f"image_{key}", row.get(key)) for key in ("width", "height"))
     table: dict[str, Any] = {"name": name, "matrix": matrix.tolist(), "distortions": _array(lens)}
-    table["fisheye"] = row.get("distortion_model") in ("equidistant", "fisheye")
+    table["distortion_model"] = row.get("distortion_model")
     if width is not None and height is not None:
         table["size"] = [width, height]
     for key, names in (("rotation", _TURNS), ("translation", _SHIFTS)):
@@ -178,7 +180,7 @@ def _chain(rows: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
             "size": list(row["resolution"]),
             "matrix": [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]],
             "distortions": _array(row.get("distortion_coeffs", [])),
-            "fisheye": row.get("distortion_model") == "equidistant",
+            "distortion_model": row.get("distortion_model"),
             "rotation": pose[:3, :3].tolist(),
             "translation": pose[:3, 3].tolist(),
         }
