@@ -192,6 +192,20 @@ def test_what_is_not_possible_is_refused(tmp_path):
         Detected(DepthOnly(recording), KeypointNetwork("stub", lambda image: (), "coco17"))
 
 
+def test_a_network_may_return_one_array_for_all_persons_and_images():
+    (item, *_) = color_images(Short(open_recording(sample_path()), 2))
+    reused = np.zeros((17, 3))
+
+    def detect(image):
+        for _ in range(2):
+            reused[:] += 1.0
+            yield reused
+
+    network = KeypointNetwork("stub", detect, "coco17")
+    found = [network.keypoints(item) for _ in range(2)]
+    assert [rows[0, 0] for one in found for rows in one.people] == [1.0, 2.0, 3.0, 4.0]
+
+
 def damaged(item):
     def decode():
         raise RecordingError("a damaged image")

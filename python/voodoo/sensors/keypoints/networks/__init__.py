@@ -53,7 +53,8 @@ class KeypointNetwork:
         """
         image = item.image
         try:
-            people = tuple(checked_rows(rows, self.layout) for rows in self.detect(image))
+            # Copies: a network may return the same array for every image.
+            people = tuple(checked_rows(rows, self.layout).copy() for rows in self.detect(image))
         except Exception as error:
             found = error if isinstance(error, MeasurementError) else f"{type(error).__name__}: {error}"
             raise MeasurementError(f"{self.name}: {found}") from error
