@@ -95,7 +95,7 @@ def follow(
 
     Returns:
         The frames, solved one by one. The status is "degraded" without a known site, or if targets are missed by more than
-        5 cm, else "tracking". The residual is the root mean square of the target residuals.
+        5 cm, else "tracking". The residual is the root mean square of the target residuals, NaN without a known site.
 
     Raises:
         VoodooError: an unknown site, a site without positions, no known site at all, an unknown value, or a damaged recording.
@@ -154,11 +154,11 @@ def follow(
 
 
 def _track(stamp: float, posture: Posture) -> Track:
-    reached = float(np.sqrt(np.mean(np.square(posture.residuals)))) if posture.residuals else float("inf")
+    reached = float(np.sqrt(np.mean(np.square(posture.residuals)))) if posture.residuals else np.nan
     return Track(
         stamps=np.array([stamp], dtype=np.float64),
         status=("tracking" if reached < _REACHED_M else "degraded",),
-        residual=np.array([reached if posture.residuals else 0.0]),
+        residual=np.array([reached]),
         joint_names=tuple(posture.joints),
         joints=np.array([list(posture.joints.values())]),
         limb_names=tuple(posture.world_from_limb),
