@@ -222,6 +222,17 @@ def test_several_depth_cameras_count_by_their_names():
         assert {"second", "/camera/depth/image_rect_raw"} <= set(step.estimate.sources)
 
 
+def test_sensors_of_joined_recordings_have_names_of_their_own():
+    recording = Short(open_recording(sample_path()))
+    own = [sensor.name for sensor in recording.info().sensors]
+    joined = Joined(recording, [recording, recording])
+    names = [sensor.name for sensor in joined.info().sensors]
+    assert names == [*own, *(f"bend_scoop{name}" for name in own), *(f"3/bend_scoop{name}" for name in own)]
+    frames = [[item.sensor for item in frame.measurements] for frame in joined]
+    assert {name for frame in frames for name in frame} == set(names)
+    assert all(len(set(frame)) == len(frame) for frame in frames)
+
+
 def test_depth_alone_is_the_same_frame_as_by_hand():
     """The front end adds nothing of its own to depth images: no filter, weight 1, the known floor."""
     recording = Short(open_recording(sample_path()))

@@ -68,7 +68,7 @@ class Joined(Around):
     """A recording whose frames also hold the measurements of other recordings since the previous frame.
 
     All must be of the same scene, in the same root frame and by the same clock. Start, reference and the times of the
-    frames are those of the first one.
+    frames are those of the first one. A sensor whose name is taken by one before it gets that of its recording in front.
 
     Args:
         first: provides the frames.
@@ -87,8 +87,16 @@ class Joined(Around):
         self._others, self._offset = tuple(others), offset
         about = first.info()
         low, high = about.start_stamp, about.start_stamp + about.duration
-        for other in others:
+        taken = {sensor.name for sensor in about.sensors}
+        self._names: list[dict[str, str]] = []
+        for number, other in enumerate(others, start=2):
             this = other.info()
+            own = {name: name for name in (sensor.name for sensor in this.sensors)}
+            for name in own.keys() & taken:
+                renamed = f"{other.name}/{name.lstrip('/')}"
+                own[name] = f"{number}/{renamed}" if renamed in taken | own.keys() else renamed
+            taken.update(own.values())
+            self._names.append(own)
             begin = this.start_stamp + offset
             if begin > high or begin + this.duration < low:
                 raise RecordingError(
@@ -98,7 +106,7 @@ class Joined(Around):
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         """The frames of the first recording with the measurements of all."""
-        streams = [_Ahead(other, self._offset) for other in self._others]
+        streams = [_Ahead(other, self._offset, own) for other, own in zip(self._others, self._names, strict=True)]
         for recorded in self._recording:
             added = tuple(item for stream in streams for item in stream.until(recorded.stamp))
             # The measurement that defines the frame stays last.
@@ -106,14 +114,17 @@ class Joined(Around):
 
     def empty_scene(self) -> Mapping[str, Sequence[ByteImage]]:
         """Images of the empty scene of all recordings."""
-        return {
-            name: observed for one in (*self._others, self._recording) for name, observed in one.empty_scene().items()
-        }
+        others = zip(self._others, self._names, strict=True)
+        found = {own.get(name, name): seen for other, own in others for name, seen in other.empty_scene().items()}
+        return found | dict(self._recording.empty_scene())
 
     def info(self) -> RecordingInfo:
         """The summary of the first, with the sensors of all."""
         about = self._recording.info()
-        sensors = tuple(sensor for other in self._others for sensor in other.info().sensors)
+        others = zip(self._others, self._names, strict=True)
+        sensors = tuple(
+            replace(sensor, name=own[sensor.name]) for other, own in others for sensor in other.info().sensors
+        )
         joined = ", ".join(str(other.path) for other in self._others)
         return replace(about, sensors=about.sensors + sensors, notes=(*about.notes, f"joined with {joined}"))
 
@@ -121,15 +132,18 @@ class Joined(Around):
 class _Ahead:
     """Reads the measurements of a recording in step with time."""
 
-    def __init__(self, recording: Recording, offset: float) -> None:
-        self._frames, self._offset = iter(recording), offset
+    def __init__(self, recording: Recording, offset: float, names: Mapping[str, str]) -> None:
+        self._frames, self._offset, self._names = iter(recording), offset, names
         self._next = next(self._frames, None)
 
     def until(self, stamp: float) -> tuple[Measurement, ...]:
         """Measurements since the last call, up to `stamp`: the last of each sensor."""
         found: tuple[Measurement, ...] = ()
         while self._next is not None and self._next.stamp + self._offset <= stamp + ROUNDED_S:
-            moved = tuple(replace(item, stamp=item.stamp + self._offset) for item in self._next.measurements)
+            moved = tuple(
+                replace(item, stamp=item.stamp + self._offset, sensor=self._names.get(item.sensor, item.sensor))
+                for item in self._next.measurements
+            )
             latest = {item.sensor for item in moved}
             found = tuple(item for item in found if item.sensor not in latest) + moved
             self._next = next(self._frames, None)
