@@ -6,6 +6,7 @@ import pytest
 from ros_bags import IDENTITY, INFO, TF, M, bag, depth_entry, only
 from voodoo.errors import RecordingError
 from voodoo.recordings import open_recording
+from voodoo.recordings.left_out import LeftOut
 
 
 class TestTransforms:
@@ -54,6 +55,15 @@ class TestTransforms:
     def test_one_that_never_changes_holds_always(self, tmp_path):
         moves = self.entries((50.0, 1.0), (51.0, 1.0))
         assert self.x_of(bag(tmp_path, INFO, depth_entry(10.0), *moves)) == [1.0]
+
+    def test_a_damaged_one_costs_no_others_of_its_message(self, tmp_path):
+        rows = [(0, "base_link", frame, (1, 0, 0), turn) for frame, turn in (("arm", (0, 0, 0, 0)), ("cam", IDENTITY))]
+        path = bag(tmp_path, INFO, ("/tf_static", 9.0, M.tf(*rows)), depth_entry(10.0))
+        left_out = LeftOut()
+        assert self.x_of(path, left_out=left_out) == [1.0]
+        assert left_out.counts == {"transforms that cannot be read": 1}
+        with pytest.raises(RecordingError, match="'base_link' from 'arm': expected a finite translation and a unit"):
+            open_recording(path)
 
     def test_standing_still_before_moving_is_not_taken_for_silence(self, tmp_path):
         moves = self.entries(*((10.0 + k / 10, 1.0) for k in range(20)), (12.0, 2.0))

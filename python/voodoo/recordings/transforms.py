@@ -105,17 +105,31 @@ class TransformTree:
         return tuple(sorted(self._neighbors))
 
     def add(self, message: Message, *, static: bool) -> None:
-        """Add a tf2_msgs/TFMessage."""
+        """Add a tf2_msgs/TFMessage.
+
+        Raises:
+            RecordingError: a transform that cannot be used; the others are added.
+        """
+        problems = []
         for item in message.transforms:
-            parent, child = str(item.header.frame_id).lstrip("/"), str(item.child_frame_id).lstrip("/")
-            where = f"{self.source}: transform {parent!r} from {child!r}"
-            if not parent or not child or parent == child:
-                raise RecordingError(f"{where}: expected two different frame names")
-            stamp = seconds(item.header.stamp)
-            transform = matrix(item.transform.translation, item.transform.rotation, where)
-            moved = stamp if static or self._set_back is None else self._set_back.of(f"{parent} {child}", stamp)
-            if moved is not None:
-                self.add_edge(parent, child, moved, transform, static=static)
+            try:
+                self._add(item, static=static)
+            except RecordingError as error:
+                problems.append(error)
+        if problems:
+            raise problems[0]
+
+    def _add(self, item: Message, *, static: bool) -> None:
+        """Add a geometry_msgs/TransformStamped."""
+        parent, child = str(item.header.frame_id).lstrip("/"), str(item.child_frame_id).lstrip("/")
+        where = f"{self.source}: transform {parent!r} from {child!r}"
+        if not parent or not child or parent == child:
+            raise RecordingError(f"{where}: expected two different frame names")
+        stamp = seconds(item.header.stamp)
+        transform = matrix(item.transform.translation, item.transform.rotation, where)
+        moved = stamp if static or self._set_back is None else self._set_back.of(f"{parent} {child}", stamp)
+        if moved is not None:
+            self.add_edge(parent, child, moved, transform, static=static)
 
     def add_edge(self, parent: str, child: str, stamp: float, transform: FloatArray, *, static: bool) -> None:
         """Add parent_from_child (4, 4) at a stamp [s]."""
