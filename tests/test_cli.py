@@ -265,6 +265,8 @@ def test_usage_errors_end_with_2(run):
         (("body", "b.toml", "--model", "papers"), "give FILE or --model, not both"),
         (("body", "b.toml", "--height", "1.7"), "give FILE or --height, not both"),
         (("track", "x", "--view", "--save", "s.rrd"), "give --view or --save, not both"),
+        (("eval", "x", "--use", "scan", "--depth-only"), "give --depth-only or --use, not both"),
+        (("eval", "x", "--result", "r.csv", "--model", "full"), "give --result or --model, not both"),
         (("track", "x", "--offset", "0.5"), "--offset is for the stamps of --with"),
     ],
 )

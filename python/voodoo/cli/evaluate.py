@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from voodoo.cli import options
-from voodoo.cli.common import cores, print_interrupted, print_text, print_written, progressing, reporting
+from voodoo.cli.common import cores, print_interrupted, print_text, print_written, progressing, refuse_both, reporting
 from voodoo.cli.signals import deferred
 from voodoo.errors import NoPoseError, VoodooError
 
@@ -73,6 +73,10 @@ def eval_command(
     from voodoo.evaluation.summary import summarize
     from voodoo.whole import check_outputs
 
+    only_depth = depth_only or None
+    refuse_both("--depth-only", only_depth, **{"--use": use})
+    tracking = {"--init": init, "--config": config, "--model": model, "--use": use, "--depth-only": only_depth}
+    refuse_both("--result", result, **tracking)
     with reporting(as_json) as report:
         words = reading.words()
         settings = config_of(config)
