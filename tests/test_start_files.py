@@ -100,7 +100,7 @@ def test_init_gives_the_first_pose_and_track_takes_it(run, folder, tmp_path):
     assert "pose at 0.033 s; wrote start.json" in message.stdout
     start = json.loads((tmp_path / "start.json").read_text())
     truth = moved(EMPTY)
-    assert start["stamp_s"] == pytest.approx(EMPTY / 60.0)
+    assert start["stamp_s"] == pytest.approx(EMPTY / 60.0) and start["frame"] == "world"
     assert np.mean([np.linalg.norm(np.subtract(start["joints"][n], truth[n])) for n in ("l_hip", "r_knee")]) < 0.05
     assert 1.6 < start["height_m"] < 1.9
     later = json.loads(run("init", folder, "--at", 0.06).stdout)

@@ -31,7 +31,7 @@ def init_command(
     """Find the first pose and write it as JSON for --init of voodoo track.
 
     It is the pose in the first frame at or after S in which a person is found: joints in meters in the recording's root frame,
-    the stature, and the frame's stamp. A start, truth or reference beside the recording is not read. If the pose is wrong, edit
+    its name, the stature, and the stamp. A start, truth or reference beside the recording is not read. If the pose is wrong, edit
     the file before giving it to voodoo track. Exit code 3 if no person is found.
 
     Examples
@@ -65,7 +65,7 @@ def init_command(
     estimate = first_pose(source, tracker, settings=settings, after=after, left_out=left_out)
     if estimate is None:
         raise NoPoseError(f"{source.name}: expected somebody from {after:.3f} s on, found nobody")
-    text = pose_as_init(estimate, tracker.body).to_json()
+    text = pose_as_init(estimate, tracker.body, frame=source.root_frame).to_json()
     if out is None:
         typer.echo(text)
     else:

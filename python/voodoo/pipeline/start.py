@@ -244,17 +244,19 @@ def starts_of(init: Beginning | None, recording: Recording) -> Starts | None:
     return Starts((EarlierStart(init),), by_tracker=False) if isinstance(init, Track) else None
 
 
-def pose_as_init(estimate: Estimate, body: Body) -> Init:
+def pose_as_init(estimate: Estimate, body: Body, *, frame: str | None = None) -> Init:
     """The pose of a frame as a first pose, with its time and, for a person, the stature.
 
     Args:
         estimate: with a pose.
         body: the body with its current sizes.
+        frame: the coordinate frame of the estimate, see Init.
     """
     common = Body.human(model="papers").site_names
     names = [name for name in body.site_names if name in common] or list(body.site_names)
     joints = {name: tuple(round(float(value), 4) for value in estimate.joints[name]) for name in names}
-    return Init.model_validate({"height_m": stature(body), "stamp_s": float(estimate.stamp), "joints": joints})
+    about = {"height_m": stature(body), "stamp_s": float(estimate.stamp), "frame": frame}
+    return Init.model_validate({**about, "joints": joints})
 
 
 def stature(body: Body) -> float | None:
