@@ -1,5 +1,7 @@
 """Point clouds and laser scans of ROS bags, in any layout."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -71,3 +73,5 @@ def test_scans_give_valid_points_only(tmp_path):
     (scan,) = only(recording, LaserScan)
     np.testing.assert_allclose(scan.points(), [[np.cos(-0.1), np.sin(-0.1), 0.0]], atol=1e-7)
     np.testing.assert_allclose(scan.root_from_sensor[:3, 3], (1, 2, 4))
+    nothing = replace(scan, ranges=np.array([1.0, 0.0, 0.05], np.float32), range_min=0.0)
+    assert len(nothing.points()) == 2

@@ -95,8 +95,9 @@ class LaserScan:
     def points(self) -> FloatArray:
         """Valid returns as (N, 3) points [m] in the laser's frame (z = 0), in the order of the rays."""
         ranges = self.ranges.astype(np.float64)
-        # Values that are not finite fail a comparison or exceed every range.
-        valid = (ranges >= self.range_min) & (ranges <= min(self.range_max, _LARGEST))
+        # Values that are not finite fail a comparison or exceed every range. Some drivers write 0 where nothing returned, and as
+        # range_min.
+        valid = (ranges > 0.0) & (ranges >= self.range_min) & (ranges <= min(self.range_max, _LARGEST))
         return ranges[valid, None] * _beams(self.angle_min, self.angle_increment, len(ranges))[valid]
 
     def __repr__(self) -> str:
