@@ -159,6 +159,10 @@ def test_a_triangulation_of_some_images_keeps_their_times(tmp_path, start, since
     np.testing.assert_allclose(recording.reference.stamps, (first + np.arange(count)) / 60.0)
     np.testing.assert_allclose(recording.reference.positions[:, 0, 1], np.arange(count))
     assert (recording.start is None) == (first > 0)
+    (folder / "walk.trc").write_text(
+        "\n".join("\t".join(map(str, line)) for line in [*lines[:5], rows[0][:2], *rows[1:]])
+    )
+    assert open_recording(folder).start is None, "nobody is there in the first row"
 
 
 def test_keypoint_files_of_which_none_can_be_read_are_an_error(tmp_path):

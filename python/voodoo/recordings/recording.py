@@ -46,14 +46,14 @@ class Reference:
     positions: FloatArray
     exact: bool
 
-    def as_start(self, *, without: tuple[str, ...] = ()) -> Start:
-        """The first row as a start, without the joints whose names end in one of these words."""
+    def as_start(self, *, without: tuple[str, ...] = ()) -> Start | None:
+        """The first row as a start, without the joints whose names end in one of these words; None if it has no others."""
         joints = {}
         for name, position in zip(self.names, self.positions[0], strict=True):
             if not name.endswith(without) and np.isfinite(position).all():
                 x, y, z = (float(value) for value in position)
                 joints[name] = (x, y, z)
-        return Start(joints=joints)
+        return Start(joints=joints) if joints else None
 
     def at(self, stamp: float, names: Sequence[str], *, within: float) -> dict[str, FloatArray]:
         """The known positions (3,) of some joints nearest to a time, if they are within so many seconds; else none."""
