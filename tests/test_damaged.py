@@ -200,6 +200,8 @@ def test_images_that_were_left_out_keep_the_numbers_of_the_others(entries, start
         ([9.0, 9.1, 8.5, 8.6], [9.0, 9.1, 8.5, 8.6]),  # by less, which its reader sees
         ([9.0, 9.1, 99.0, 9.2, 9.3, 9.4], [9.0, 9.1, 99.0, None, 9.3, 9.4]),  # one is wild
         ([9.0, 9.1, 5.0, 5.1, 2.0, 2.1], [9.0, 9.1, None, 9.3, None, 9.5]),  # twice
+        ([20.0, 22.0, 24.0, 5.0, 7.0, 9.0], [20.0, 22.0, 24.0, None, 28.0, 30.0]),  # slow
+        ([20.0, 22.0, 99.0, 26.0, 28.0, 30.0], [20.0, 22.0, 99.0, None, 28.0, 30.0]),  # slow, and one is wild
     ],
 )
 def test_stamps_go_on_after_a_clock_was_set_back(stamps, moved):
@@ -213,5 +215,6 @@ def test_sensors_of_one_clock_are_moved_together_and_of_another_by_themselves():
     found = {name: [clock.of(name, stamp) for stamp in stamps] for name, stamps in rows.items()}
     assert found["a"][3] == pytest.approx(9.3) and found["slow"][3] == pytest.approx(9.7)
     assert found["other"][3] == pytest.approx(70.3) and len(clock.steps) == len(clock.words) == 2
+    assert [clock.of("slower", stamp) for stamp in (5.0, 7.0, 9.0, 4.9, 6.9)][4] == pytest.approx(6.9 + clock.steps[0])
     again = SetBack(clock)
     assert [again.of("slow", stamp) for stamp in rows["slow"]] == found["slow"] and len(clock.words) == 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -30,6 +31,11 @@ class _Sensor:
     apart: float | None = None
     steps: int = 0
     moved: float = 0.0
+    interval: float = 0.0
+
+    def follows(self, stamp: float, before: float) -> bool:
+        """Whether a stamp goes on from one before it; of a slow sensor also at two intervals, of which the shortest is known."""
+        return 0.0 < stamp - before < max(BACK_S, 3.0 * self.interval)
 
 
 class SetBack:
@@ -53,11 +59,13 @@ class SetBack:
         """The stamp [s], moved on; None if it is out of order, by more than BACK_S."""
         state = self._sensors.setdefault(sensor, _Sensor(stamp))
         if stamp < state.last - BACK_S:
-            if state.apart is None or not 0.0 < stamp - state.apart < BACK_S:
+            if state.apart is None or not state.follows(stamp, state.apart):
                 state.apart = stamp
                 return None
-            if state.before is None or not 0.0 < state.apart - state.before < BACK_S:  # else the last one was wild
+            if state.before is None or not state.follows(state.apart, state.before):  # else the last one was wild
                 self._step(sensor, state, stamp)
+        elif stamp > state.last:
+            state.interval = min(state.interval or math.inf, stamp - state.last)
         state.before, state.last, state.apart = state.last, stamp, None
         return stamp + state.moved
 
@@ -65,7 +73,8 @@ class SetBack:
         assert state.apart is not None
         # The stamp that was put aside had followed the last one as this one follows it.
         own = state.last - state.apart + (stamp - state.apart)
-        near = (at for at, one in enumerate(self.steps) if at >= state.steps and abs(one - own) < BACK_S)
+        alike = max(BACK_S, state.interval)
+        near = (at for at, one in enumerate(self.steps) if at >= state.steps and abs(one - own) < alike)
         at = next(near, len(self.steps))
         if at == len(self.steps):
             self.steps.append(own)
