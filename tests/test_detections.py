@@ -1,5 +1,6 @@
 """Detections that come with a frame: who is measured, who comes back, who is new."""
 
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,8 @@ from voodoo.measurements import MarkerSet, RecordedFrame
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.start import stature
 from voodoo.sensors.adapters import Adapter, register, unregister
+from voodoo.sensors.model import SensorModel
+from voodoo.sensors.rays import SiteRay, add_rays
 from voodoo.sensors.settings import FrontEndSettings
 
 BODY = voodoo.Body.human(1.75)
@@ -184,3 +187,23 @@ def test_a_clock_that_is_set_back_keeps_pose_and_sizes_but_not_for_the_next_pers
     assert status == "tracking" and stature(body) == pytest.approx(stature(before), rel=0.01)
     follower.restart(back=False, gone=True)
     assert tracker.body == BODY and not tracker.estimate.joints
+
+
+def test_any_mapping_is_a_detection_and_a_refused_one_leaves_nothing():
+    made = voodoo.Frame(0.0)
+    with pytest.raises(MeasurementError, match="joints"):
+        made.add_detection({"l_wrist": "left"}, source="network")
+    assert "network" not in repr(made)
+    with pytest.raises(MeasurementError, match="joints: expected a mapping"):
+        made.add_detection(3)
+    made.add_detection(MappingProxyType(person()))
+    assert voodoo.Tracker(BODY, detector=None).step(made).status == "tracking"
+
+
+def test_rays_of_which_one_is_refused_leave_nothing():
+    made = voodoo.Frame(0.0)
+    rays = [SiteRay("l_wrist", np.zeros(3), np.array([1.0, 0.0, 0.0]), sigma, "camera") for sigma in (0.1, 0.0)]
+    before = repr(made)
+    with pytest.raises(MeasurementError, match="sigma"):
+        add_rays(made, rays, model=SensorModel())
+    assert repr(made) == before

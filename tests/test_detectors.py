@@ -191,6 +191,7 @@ def test_ctrl_c_in_a_detector_is_not_swallowed(someone):
         ([DetectedPerson(None, 0.9)], "joints: expected a mapping from names, found None"),
         ([DetectedPerson(7, 0.9)], "joints: expected a mapping from names"),
         ([DetectedPerson({}, 0.9, floor=3)], "floor: expected a unit normal"),
+        ([DetectedPerson({}, 0.9, floor=((0, 0, 2), 1.0))], r"floor\[0\]: expected a unit normal"),
     ],
 )
 def test_what_cannot_be_meant_is_named_and_changes_nothing(someone, found, words):

@@ -202,3 +202,17 @@ def test_whatever_is_asked_the_answer_is_finite_and_within_the_limits(arm, far, 
     reached = found.joints["l_hand"]
     expected = [np.linalg.norm(reached - np.array(target.values[:3])) for target in targets[:2]]
     assert found.residuals[:2] == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+def test_a_transform_in_any_order_of_memory_is_the_same(arm):
+    turn = np.array([[0.0, -1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+    for shift in (0.0, 0.3):
+        turn[0, 3] = shift
+        as_it_is, other = (arm.forward(np.zeros(4), world_from_base=pose)[1] for pose in (turn, np.asfortranarray(turn)))
+        assert all((place == other[name]).all() for name, place in as_it_is.items())
+
+
+def test_a_chain_without_angles_has_residuals():
+    chain = ik.Chain(voodoo.Body.human(1.75), limbs=("pelvis",))
+    found = ik.solve(chain, {"humanoid_root": (1.0, 0.0, 0.0)})
+    assert found.residuals[0] > 0.9 and len(found.angles) == 0

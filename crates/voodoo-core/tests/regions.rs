@@ -251,3 +251,23 @@ fn pictures_of_the_empty_scene_help_where_clothes_are_as_the_room() {
     });
     assert!(ends[1] < 0.02 && ends[1] < ends[0] + 0.002, "without {} m, with {} m", ends[0], ends[1]);
 }
+
+#[test]
+fn colors_that_the_user_learns_are_learned_each_time_and_leave_the_next_step_as_it_is() {
+    let body = human();
+    let mut tracker = started(&body, Config::default());
+    let all = pictures(&body, |_| 0.0);
+    let colors: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&all[camera], camera, 0.0)).collect();
+    fn of<'a>(colors: &'a [ColorImage<'a>]) -> Frame<'a> {
+        Frame { colors, ..Frame::empty(0.0) }
+    }
+    let mut seen = vec![tracker.segment(&of(&colors[..1]), None).unwrap()];
+    for darker in [10, 20] {
+        let dark: Vec<[u8; 3]> = all[0].iter().map(|pixel| pixel.map(|value| value.saturating_sub(darker))).collect();
+        tracker.learn_colors(&of(&[picture(&dark, 0, 0.0)]), None).unwrap();
+        seen.push(tracker.segment(&of(&colors[..1]), None).unwrap());
+    }
+    assert!(seen[0] != seen[1] && seen[1] != seen[2]);
+    let estimate = tracker.step(&Frame { colors: &colors, ..Frame::empty(0.0) }).unwrap();
+    assert_eq!(estimate.status, Status::Tracking);
+}

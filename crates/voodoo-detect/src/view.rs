@@ -88,11 +88,52 @@ impl ThinnedImage {
         (self.step * self.step) as f64 / (fx * fy)
     }
 
-    /// The pixels of the full image that a pixel stands for.
+    /// The pixels of the full image that a pixel stands for: those that it is nearest to.
     pub(crate) fn block(&self, index: usize) -> impl Iterator<Item = usize> {
-        let (row, column) = (index / self.width * self.step, index % self.width * self.step);
         let [rows, columns] = self.camera.as_ref().map_or([0; 2], |camera| [camera.height(), camera.width()]);
-        let across = column..(column + self.step).min(columns);
-        (row..(row + self.step).min(rows)).flat_map(move |row| across.clone().map(move |column| row * columns + column))
+        let before = (self.step - 1) / 2;
+        let nearest = |at: usize, size: usize| {
+            let last = (at + 1) * self.step >= size;
+            let end = if last { size } else { (at + 1) * self.step - before };
+            (at * self.step).saturating_sub(before)..end
+        };
+        let across = nearest(index % self.width, columns);
+        nearest(index / self.width, rows).flat_map(move |row| across.clone().map(move |column| row * columns + column))
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use voodoo_core::DepthPixels;
+    use voodoo_core::math::Pose;
+
+    #[test]
+    fn a_pixel_stands_for_those_that_it_is_nearest_to() {
+        let (pixels, camera) = (vec![2000; 640 * 480], Camera::pinhole(640, 480, [560.0, 560.0, 319.5, 239.5]));
+        let camera = &camera.unwrap();
+        let image = DepthImage {
+            pixels: DepthPixels::U16(&pixels),
+            camera,
+            meters_per_unit: 0.001,
+            world_from_sensor: Pose::IDENTITY,
+            weight: 1.0,
+            source: 0,
+        };
+        let mut view = ThinnedImage::default();
+        view.read(&image, &Surroundings::default());
+        let mut covered = vec![0; image.camera.pixels()];
+        for index in 0..view.depth.len() {
+            for pixel in view.block(index) {
+                covered[pixel] += 1;
+            }
+        }
+        assert!(covered.iter().all(|count| *count == 1));
+        let width = image.camera.width();
+        let middle = view.block(view.width + 1).map(|pixel| (pixel % width) as f64);
+        let count = view.step * view.step;
+        let off = middle.sum::<f64>() / count as f64 - view.step as f64;
+        assert!(off.abs() <= 0.5, "{off}");
     }
 }

@@ -122,6 +122,7 @@ pub(crate) fn contiguous<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, 
 pub(crate) fn rows<'a, const N: usize>(name: &str, array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [[f64; N]]> {
     let (expected, found) = (format_args!("shape (N, {N})"), format_args!("{:?}", array.shape()));
     unless(array.dims()[1] == N, name, expected, found)?;
+    unless(array.is_c_contiguous(), name, "C-contiguous memory", "another order")?;
     Ok(array.as_slice()?.as_chunks().0)
 }
 
@@ -136,8 +137,12 @@ pub(crate) fn vectors(name: &str, array: &PyReadonlyArray2<'_, f64>) -> PyResult
 /// Sequences are converted number by number, which takes many times as long.
 fn entries<const N: usize>(value: &Bound<'_, PyAny>, shape: &[usize]) -> Option<[f64; N]> {
     let array = value.cast::<PyArrayDyn<f64>>().ok()?;
-    let plain = value.get_type().is(PyUntypedArray::type_object(value.py())) && array.shape() == shape;
-    let view = if plain { array.try_readonly().ok()? } else { return None };
+    let is_plain = value.get_type().is(PyUntypedArray::type_object(value.py()));
+    let view = if is_plain && array.shape() == shape && array.is_c_contiguous() {
+        array.try_readonly().ok()?
+    } else {
+        return None;
+    };
     view.as_slice().ok()?.try_into().ok()
 }
 

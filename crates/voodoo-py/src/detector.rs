@@ -12,7 +12,7 @@ use voodoo_core::math::{Vec3, matrix};
 use voodoo_core::{DepthImage, Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Ground, Surroundings};
 
 use crate::arrays::{Row, contiguous, vector};
-use crate::errors::{ConfigError, MeasurementError, wrong, wrong_argument};
+use crate::errors::{ConfigError, MeasurementError, unless, wrong, wrong_argument};
 
 /// Standard deviation of a joint for which a detector reports none, meters.
 const SIGMA: f64 = 0.05;
@@ -215,7 +215,8 @@ fn floor(person: &Bound<'_, PyAny>) -> PyResult<Option<Ground>> {
     let wrong = |_| wrong_argument("floor", "a unit normal and an offset in meters", &found);
     let (normal, offset): (Bound<'_, PyAny>, f64) = found.extract().map_err(wrong)?;
     let normal: Vec3 = vector("floor[0]", &normal)?;
-    Ok(normal.try_normalize().map(|normal| Ground { normal, offset }))
+    unless(normal.is_normalized(), "floor[0]", "a unit normal", normal)?;
+    Ok(Some(Ground { normal, offset }))
 }
 
 /// The attribute `mask` (height, width) bool, as indices; none where it is missing or None.

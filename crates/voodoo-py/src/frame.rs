@@ -170,18 +170,22 @@ impl PyFrame {
     #[pyo3(signature = (joints, *, log_odds=f64::INFINITY, weight=1.0, source="detections"))]
     fn add_detection(
         &mut self,
-        joints: &Bound<'_, PyDict>,
+        joints: &Bound<'_, PyAny>,
         #[pyo3(from_py_with = arguments::log_odds)] log_odds: f64,
         #[pyo3(from_py_with = arguments::weight)] weight: f64,
         source: &str,
     ) -> PyResult<()> {
-        let source = number(&mut self.sources, source);
+        let pairs = joints.py().get_type::<PyDict>().call1((joints,));
+        let pairs = pairs.ok().and_then(|pairs| pairs.cast_into::<PyDict>().ok());
+        let pairs = pairs.ok_or_else(|| wrong_argument("joints", "a mapping from names to positions", joints))?;
         let position = |(name, position): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
             let site = arguments::site(&name)?;
             let position = vector(&format!("joints[{site}]"), &position)?;
-            Ok((site, PositionRelation { site: 0, position, weight, bias: 0.0, source }))
+            Ok((site, PositionRelation { site: 0, position, weight, bias: 0.0, source: 0 }))
         };
-        let positions = joints.iter().map(position).collect::<PyResult<_>>()?;
+        let mut positions = pairs.iter().map(position).collect::<PyResult<Vec<_>>>()?;
+        let source = number(&mut self.sources, source);
+        positions.iter_mut().for_each(|(_, of)| of.source = source);
         self.detections.push((positions, log_odds));
         Ok(())
     }
@@ -210,23 +214,25 @@ impl PyFrame {
         max_weight: f64,
         min_trust: f64,
     ) -> PyResult<usize> {
-        let mut count = 0;
-        for ray in rays.iter().filter(|ray| ray.trust >= min_trust) {
-            let (site, source, bias) = (ray.site.clone(), number(&mut self.sources, &ray.source), ray.bias);
-            let (origin, direction) = (ray.origin.0, ray.direction.0);
+        let used = || rays.iter().filter(|ray| ray.trust >= min_trust);
+        let weights = used().map(|ray| {
             let weight = |sigma: f64| {
                 unless(sigma > 0.0 && sigma.is_finite(), "sigma", "finite meters > 0", sigma)?;
                 Ok::<_, PyErr>((reference_sigma / sigma).powi(2).min(max_weight) * ray.trust)
             };
+            Ok([ray.place.as_ref().map_or(Ok(0.0), |_| weight(ray.place_sigma))?, weight(ray.sigma)?])
+        });
+        let weights: Vec<[f64; 2]> = weights.collect::<PyResult<_>>()?;
+        for (ray, [of_place, weight]) in used().zip(&weights) {
+            let (site, source, bias) = (ray.site.clone(), number(&mut self.sources, &ray.source), ray.bias);
+            let (origin, direction) = (ray.origin.0, ray.direction.0);
             if let Some(Row(position)) = ray.place {
-                let of = PositionRelation { site: 0, position, weight: weight(ray.place_sigma)?, bias, source };
+                let of = PositionRelation { site: 0, position, weight: *of_place, bias, source };
                 self.positions.push((site.clone(), of));
             }
-            self.rays
-                .push((site, RayRelation { site: 0, origin, direction, weight: weight(ray.sigma)?, bias, source }));
-            count += 1;
+            self.rays.push((site, RayRelation { site: 0, origin, direction, weight: *weight, bias, source }));
         }
-        Ok(count)
+        Ok(weights.len())
     }
 
     #[doc = stub!("Frame.set_ground")]

@@ -34,6 +34,8 @@ impl Backgrounds {
         } else {
             reset(&mut background.depth, image.pixels.len(), 0.0);
             background.rays.clear();
+            background.pending.clear();
+            background.frames.clear();
             (background.since, background.filled) = (None, false);
         }
         background.pending.resize(image.pixels.len(), 0.0);
@@ -168,6 +170,25 @@ mod tests {
         }
         // A rotation of 0.2 rad leaves most of the view; surfaces that fall into one pixel are lost.
         assert!(known * 2 > first.len(), "{known} pixels are left");
+    }
+
+    #[test]
+    fn another_view_begins_with_nothing_seen() {
+        let camera = camera(Lens::Pinhole);
+        let pixels = view_from(&camera, &pose(0.0, 0.0));
+        let mut backgrounds = Backgrounds::default();
+        for (x, pending) in [(0.0, 2.0), (1.0, 0.0)] {
+            let images = [image(&pixels, &camera, pose(x, 0.0))];
+            backgrounds.register(&Frame { images: &images, ..Frame::empty(x) });
+            let background = &mut backgrounds.images[0];
+            if x == 0.0 {
+                background.pending.fill(pending);
+                background.frames.fill(59);
+            } else {
+                assert!(background.pending.iter().all(|z| *z == pending) && background.frames.iter().all(|n| *n == 0));
+            }
+        }
+        assert_eq!(backgrounds.images.len(), 1);
     }
 
     #[test]

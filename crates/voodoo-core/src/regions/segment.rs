@@ -31,7 +31,7 @@ impl ColorRegions {
     pub(crate) fn learn_at(&mut self, posed: Posed) {
         self.begin(posed);
         self.find(posed, 0, |_| true, &mut Correspondences::default());
-        self.learn(posed.frame);
+        posed.frame.colors.iter().for_each(|picture| self.teach(picture));
     }
 
     fn segment_picture(&mut self, picture: &ColorImage, posed: Posed) -> Vec<f32> {

@@ -139,6 +139,11 @@ impl IkSolver {
         let problem = IkProblem { criterion: problem.criterion.filter(shows), ..*problem };
         let goals_only = problem.without_images();
         self.start(&goals_only, angles);
+        if angles.is_empty() {
+            self.evaluate_here(&problem, angles);
+            self.report.h = self.here.h;
+            return self.report;
+        }
         let count = self.levels.ranges.len();
         // Levels join one after the other, the image last. Thus the result of a level does not depend on those below it.
         for phase in 0..count + usize::from(problem.criterion.is_some()) {

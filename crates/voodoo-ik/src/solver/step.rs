@@ -23,9 +23,7 @@ impl IkSolver {
         if last == count {
             self.image_part(problem, count, angles);
         }
-        let moved = self.advance(problem, last, slack, angles);
-        problem.model.normalize(angles);
-        moved
+        self.advance(problem, last, slack, angles)
     }
 
     /// Computes the part of one level: `(J P)^+ (-e - J d)` after the step `d` of the levels above (Baerlocher and Boulic 2004).
@@ -144,6 +142,7 @@ impl IkSolver {
             // The clamp only removes rounding errors: stages end at the limits.
             self.trial_angles[i] = (angles[i] + step).clamp(limits[i][0], limits[i][1]);
         }
+        problem.model.normalize(&mut self.trial_angles);
         self.evaluate(problem);
     }
 
