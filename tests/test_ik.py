@@ -208,7 +208,9 @@ def test_a_transform_in_any_order_of_memory_is_the_same(arm):
     turn = np.array([[0.0, -1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
     for shift in (0.0, 0.3):
         turn[0, 3] = shift
-        as_it_is, other = (arm.forward(np.zeros(4), world_from_base=pose)[1] for pose in (turn, np.asfortranarray(turn)))
+        as_it_is, other = (
+            arm.forward(np.zeros(4), world_from_base=pose)[1] for pose in (turn, np.asfortranarray(turn))
+        )
         assert all((place == other[name]).all() for name, place in as_it_is.items())
 
 
