@@ -218,3 +218,22 @@ def test_a_chain_without_angles_has_residuals():
     chain = ik.Chain(voodoo.Body.human(1.75), limbs=("pelvis",))
     found = ik.solve(chain, {"humanoid_root": (1.0, 0.0, 0.0)})
     assert found.residuals[0] > 0.9 and len(found.angles) == 0
+
+
+def test_a_root_that_turns_past_half_a_turn_takes_no_more_steps_than_any():
+    chain = ik.Chain(voodoo.Body.human(1.75, model="full"), root="free")
+    rng, steps = np.random.default_rng(1), []
+    goal = np.clip(chain.rest() + rng.normal(0.0, 0.2, len(chain.rest())), *chain.limits.T)
+    for before, after in (((0.1, 0.0, 3.1), (0.1, 0.8, 3.2)), ((0.1, 0.0, 2.1), (0.1, 0.8, 2.2))):
+        start = chain.rest()
+        start[3:6], goal[3:6] = before, after
+        places = chain.forward(goal)[1]
+        found = ik.solve(
+            chain,
+            {name: places[name] for name in ("l_wrist", "r_wrist", "l_ankle", "r_ankle", "skullbase")},
+            start=start,
+            steps=60,
+        )
+        assert found.converged and max(found.residuals) < 1e-6
+        steps.append(found.steps)
+    assert steps[0] <= steps[1] + 3, steps

@@ -242,33 +242,3 @@ proptest! {
         }
     }
 }
-
-#[test]
-fn a_root_that_turns_past_half_a_turn_converges_as_fast_as_any() {
-    let body = human();
-    let limbs: Vec<usize> = (0..body.limbs().len()).collect();
-    let model = ChainModel::new(&body, &limbs, true).unwrap();
-    let turned = |vector: [f64; 3]| {
-        let mut angles = vec![0.0; model.freedoms()];
-        angles[3..6].copy_from_slice(&vector);
-        angles
-    };
-    let there = turned([0.3, -0.2, 3.25]);
-    let goals: Vec<Goal> = ["l_wrist", "r_wrist", "l_ankle", "r_ankle", "skullbase"]
-        .map(|site| {
-            let to = goal(&body, &model, site, Aim::Position(Vec3::ZERO), 0);
-            Goal { aim: Aim::Position(position(&model, &to, &there)), ..to }
-        })
-        .into();
-    let mut angles = turned([0.0, 0.0, 3.1]);
-    let problem = IkProblem {
-        model: &model,
-        base: Pose::IDENTITY,
-        goals: &goals,
-        criterion: None,
-        rest: &[],
-        options: SolverOptions::default(),
-    };
-    let report = IkSolver::default().solve(&problem, &mut angles);
-    assert!(report.converged, "{report:?}");
-}
