@@ -274,6 +274,8 @@ def recover(folder: str | Path, *, taken: Iterable[Path] = ()) -> tuple[list[Pat
     others = {path.resolve() for path in taken}
     for hidden in sorted(a_path(folder, error=VoodooError).glob(f".*{SUFFIX}")):
         try:
+            if not hidden.exists():  # one without poses, which the writing of others has removed
+                continue
             if hidden.stat().st_uid != getattr(os, "geteuid", lambda: 0)() or not (hidden / KEPT).is_file():
                 continue
             if (lock := locked(hidden)) is None:
