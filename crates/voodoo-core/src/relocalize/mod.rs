@@ -160,7 +160,8 @@ impl Relocalizer {
         self.floor = self.detected().filter(|_| auto_initialized).and_then(floor_under);
     }
 
-    /// Runs the detector on the owned part of a frame where that is due; nothing was detected in it before. `root` is the expected position of the body, world frame.
+    /// Runs the detector on the owned part of a frame where that is due; the detection of the frame before was forgotten. `root` is
+    /// the expected position of the body, world frame.
     pub(crate) fn detect(
         &mut self,
         body: &Body,
