@@ -268,6 +268,7 @@ def test_usage_errors_end_with_2(run):
         (("eval", "x", "--use", "scan", "--depth-only"), "give --depth-only or --use, not both"),
         (("eval", "x", "--result", "r.csv", "--model", "full"), "give --result or --model, not both"),
         (("track", "x", "--offset", "0.5"), "--offset is for the stamps of --with"),
+        (("track", "x", "--draw-regions"), "--draw-regions is for --overlay"),
     ],
 )
 def test_what_would_be_ignored_is_refused(run, arguments, words):

@@ -13,7 +13,7 @@ from voodoo.recordings.keypoint_files import read_openpose_json
 from voodoo.recordings.keypoint_layouts import LAYOUTS
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.keypoints import KeypointSensor
-from voodoo.sensors.keypoints.sites import nearest_person, site_pixels, window_depth
+from voodoo.sensors.keypoints.sites import assign_keypoints, nearest_person, site_pixels, window_depth
 
 CAMERA = Camera(640, 480, 500.0, 500.0, 319.5, 239.5, (-0.1, 0.02, 0.0, 0.0))
 # 3 m in front of the person, 1 m high, looking along world y
@@ -192,6 +192,18 @@ def test_the_person_nearest_to_the_prediction_is_chosen():
     image = KeypointImage("camera", 0.0, (other, mine), "body25", CAMERA, POSE)
     assert nearest_person(image, predicted=joints) is mine
     assert nearest_person(replace(image, people=()), predicted=joints) is None
+
+
+@pytest.mark.parametrize("least", [0.02, 0.2])
+def test_the_least_confidence_holds_where_people_are_told_apart(least):
+    joints = dict(tracker().estimate.joints)
+    mine = keypoints_of(joints, "body25")
+    doubtful, other = mine * [1.0, 1.0, 0.05], mine + [20.0, 0.0, 0.0]
+    image = KeypointImage("camera", 0.0, (other, doubtful), "body25", CAMERA, POSE)
+    expected = doubtful if least < 0.05 else other
+    assert nearest_person(image, predicted=joints, min_confidence=least) is expected
+    of, _ = assign_keypoints(image, {7: joints}, min_confidence=least)
+    assert of[7].people[0] is expected
 
 
 def test_other_programs_of_the_same_keypoints(tmp_path):

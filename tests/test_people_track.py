@@ -315,7 +315,7 @@ shape = { length = 0.2, a0 = 0.10, b0 = 0.10, a1 = 0.08, b1 = 0.08 }
 
 REFUSED = {
     "`--init FILE`": ("init: expected none", ("--init", "start.json")),
-    "`--draw-regions`, `--background`": ("draw-regions: expected none with", ("--draw-regions",)),
+    "`--draw-regions`, `--background`": ("draw-regions: expected none with", ("--draw-regions", "--overlay", "o")),
     "a body that the detector does not know": (
         "by depth alone the body 'lamp' is not found",
         ("--body", "lamp.toml"),
@@ -373,7 +373,7 @@ def test_what_works_with_several_people(run, with_sensor, what, tmp_path):
     [
         (("--layout", "body25"), "layout: expected an input it is for (keypoints), found depth"),
         (("--marker-map", "map.toml"), "marker-map: expected an input it is for (markers)"),
-        (("--draw-regions",), "draw-regions: expected an input it is for (color)"),
+        (("--draw-regions", "--overlay", "o"), "draw-regions: expected an input it is for (color)"),
         (("--use", "skin", "--depth-range", "1,3"), "depth-range: expected an input it is for (depth), found skin"),
         (("--use", "skin", "--exclude", "0,0,0,1,1,1"), "exclude: expected an input it is for (depth, points, scan)"),
     ],

@@ -24,6 +24,7 @@ from voodoo.recordings import (
     sample_path,
 )
 from voodoo.recordings.keypoint_layouts import layout_of
+from voodoo.sensors.adapters.base import Context, Memory
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.pixels import in_sensor
@@ -355,6 +356,16 @@ def test_what_is_out_of_a_cameras_range_is_not_used():
         row = of(estimate, "depth")
         counts[farthest] = 0 if row is None else row[0]
     assert counts[7.5] > 500 and counts[1.0] == 0
+
+
+def test_what_is_out_of_a_cameras_range_is_not_behind_a_keypoint():
+    frame = next(iter(open_recording(sample_path())))
+    for farthest, returns in ((7.5, True), (1.0, False)):
+        settings = FrontEndSettings(use=("depth", "keypoints"), depth_filter=DepthFilter(farthest=farthest))
+        tracker = voodoo.Tracker(voodoo.Body.human())
+        context = Context(frame.stamp, frame.measurements, {}, settings, tracker, SiteGate(), Memory())
+        (depth,) = context.depth_images
+        assert bool(depth.image.any()) is returns
 
 
 def test_a_laser_alone_is_lost_although_it_matches():

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
-from voodoo.measurements import MARKER_SIGMA_M, ByteImage, FloatArray
+from voodoo.measurements import MARKER_SIGMA_M, ByteImage, DepthImage, FloatArray
 from voodoo.model.joint import corners
 from voodoo.names import INPUTS
 from voodoo.recordings.recording import Recording
@@ -91,6 +91,12 @@ class FrontEndSettings:
     def clothes(self) -> bool:
         """Whether colors of clothes tell several persons apart: by default, and if a cue of color images is used."""
         return self.use == default_inputs() or not {"color", "skin"}.isdisjoint(self.use)
+
+    def filtered(self, depth: DepthImage) -> DepthImage:
+        """A depth image without the pixels that `depth_filter` removes."""
+        if self.depth_filter is None:
+            return depth
+        return replace(depth, image=self.depth_filter.apply(depth.image, meters_per_unit=depth.meters_per_unit))
 
     @classmethod
     def of(cls, recording: Recording, *, use: Sequence[str] | None = None) -> FrontEndSettings:

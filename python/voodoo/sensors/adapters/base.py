@@ -117,10 +117,10 @@ class Context:
 
     @cached_property
     def depth_images(self) -> list[DepthImage]:
-        """The depth images of the frame, if depth is used."""
+        """The depth images of the frame, filtered if the settings say so, if depth is used."""
         if "depth" not in self.settings.use:
             return []
-        return [item for item in self.measurements if isinstance(item, DepthImage)]
+        return [self.settings.filtered(item) for item in self.measurements if isinstance(item, DepthImage)]
 
     def range_weight(self, noise: RangeNoise | None, sharing: float, root_from_sensor: FloatArray) -> float:
         """Weight of a range at the body's distance from a sensor, 3 m while no person is tracked; 1 if `noise` is None."""

@@ -25,11 +25,8 @@ class DepthAdapter(Adapter[DepthImage]):
     def add(self, frame: Frame, item: DepthImage, context: Context) -> None:
         """As a depth image, weighted for the distance of the body."""
         chosen = context.settings
-        image = item.image
-        if chosen.depth_filter is not None:
-            image = chosen.depth_filter.apply(image, meters_per_unit=item.meters_per_unit)
         frame.add_depth(
-            image,
+            chosen.filtered(item).image,
             camera=item.camera,
             meters_per_unit=item.meters_per_unit,
             world_from_sensor=item.root_from_sensor,

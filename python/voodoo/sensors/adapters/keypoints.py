@@ -28,7 +28,7 @@ class KeypointsAdapter(Adapter[KeypointImage]):
     def add(self, frame: Frame, item: KeypointImage, context: Context) -> None:
         """As rays, or with depth as positions; `Memory` keeps the report of each sensor under "keypoints"."""
         chosen = context.settings
-        person = nearest_person(item, predicted=context.predicted)
+        person = nearest_person(item, predicted=context.predicted, min_confidence=chosen.min_confidence)
         if person is None:
             context.memory.put(self.kind, item.sensor, KeypointReport())
             return
@@ -64,7 +64,9 @@ class KeypointsAdapter(Adapter[KeypointImage]):
 
     def shares(self, item: KeypointImage, persons: Mapping[int, Context]) -> Mapping[int, KeypointImage]:
         """The detected people are assigned to the persons jointly."""
-        of, rest = assign_keypoints(item, {number: context.predicted for number, context in persons.items()})
+        least = next(iter(persons.values())).settings.min_confidence
+        predicted = {number: context.predicted for number, context in persons.items()}
+        of, rest = assign_keypoints(item, predicted, min_confidence=least)
         return {**of, NOBODY: rest}
 
     def forget(self, memory: Memory) -> None:

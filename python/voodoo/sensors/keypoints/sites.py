@@ -136,9 +136,11 @@ def check_confidence(least: object) -> None:
         raise MeasurementError(f"min_confidence: expected a finite number, found {least!r}")
 
 
-def nearest_person(item: KeypointImage, *, predicted: Mapping[str, FloatArray]) -> FloatArray | None:
+def nearest_person(
+    item: KeypointImage, *, predicted: Mapping[str, FloatArray], min_confidence: float = MIN_CONFIDENCE
+) -> FloatArray | None:
     """The person (K, 3) whose keypoints lie nearest to the predicted sites in the image, by the median distance; None
-    if none.
+    if none. For the least confidence see `site_pixels`.
 
     Raises:
         MeasurementError: wrong shapes, or an unknown layout.
@@ -148,7 +150,7 @@ def nearest_person(item: KeypointImage, *, predicted: Mapping[str, FloatArray]) 
         predicted,
         world_from_sensor=rigid(item.root_from_sensor),
         camera=item.camera,
-        least=MIN_CONFIDENCE,
+        least=min_confidence,
     )
     return None if nearest is None else item.people[nearest]
 
@@ -159,19 +161,25 @@ _FEWEST = 4
 
 
 def assign_keypoints(
-    item: KeypointImage, predicted: Mapping[int, Mapping[str, FloatArray]]
+    item: KeypointImage,
+    predicted: Mapping[int, Mapping[str, FloatArray]],
+    *,
+    min_confidence: float = MIN_CONFIDENCE,
 ) -> tuple[dict[int, KeypointImage], KeypointImage]:
     """Assign the keypoints of an image to persons jointly, by the distances of their rays from the predicted sites.
 
     Args:
         item: the image.
         predicted: id of a person -> site -> predicted position (3,) [m], root frame.
+        min_confidence: see `site_pixels`.
 
     Returns:
         Id of a person -> the image with only that person's keypoints, and the image with those of no person.
     """
     numbers = list(predicted)
-    costs = np.array([[_away(item, rows, predicted[number]) for rows in item.people] for number in numbers])
+    costs = np.array(
+        [[_away(item, rows, predicted[number], min_confidence) for rows in item.people] for number in numbers]
+    )
     of: dict[int, KeypointImage] = {}
     taken: set[int] = set()
     if costs.size:
@@ -184,9 +192,10 @@ def assign_keypoints(
     return of, replace(item, people=rest)
 
 
-def _away(item: KeypointImage, rows: FloatArray, predicted: Mapping[str, FloatArray]) -> float:
+def _away(item: KeypointImage, rows: FloatArray, predicted: Mapping[str, FloatArray], min_confidence: float) -> float:
     """Median distance [m] of the rays of keypoints from the predicted sites; infinite with too few keypoints."""
-    observed = [site for site in site_pixels(rows, layout=item.layout)[0] if site.site in predicted]
+    found, _ = site_pixels(rows, layout=item.layout, min_confidence=min_confidence)
+    observed = [site for site in found if site.site in predicted]
     if len(observed) < _FEWEST:
         return float("inf")
     origin, directions = world_rays(item.camera, item.root_from_sensor, [site.pixel for site in observed])
