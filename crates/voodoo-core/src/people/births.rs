@@ -292,6 +292,16 @@ impl People {
         self.followed().map_or(&self.prototype, |person| person.tracker.body())
     }
 
+    /// Positions of sites of `detected_body`, as those of the sites of the same names of a person.
+    pub(super) fn own_positions(&self, person: &Person, positions: &[PositionRelation]) -> Vec<PositionRelation> {
+        let (theirs, body) = (self.detected_body(), person.tracker.body());
+        let own = |of: &PositionRelation| {
+            let site = if person.followed { of.site } else { body.site_index(&theirs.sites()[of.site].name).ok()? };
+            Some(PositionRelation { site, ..*of })
+        };
+        positions.iter().filter_map(own).collect()
+    }
+
     /// Returns the colors of a tentative track's clothes, where there are color pictures.
     fn clothes_of_track(&self, frame: &Frame, track: &TentativeTrack) -> Clothes {
         let mut clothes = Clothes::default();
@@ -326,18 +336,19 @@ impl People {
 
     /// Starts a person's tracker at a tentative track, in the pixels whose owner is `own`. Returns whether the person is there.
     fn reactivate(&mut self, frame: &Frame, track: &TentativeTrack, number: usize, own: usize) -> bool {
-        self.scene.known.release(frame, track.image, &track.detection.pixels);
-        let person = &mut self.persons[number];
-        if !self.options.includes(person.id) {
+        if !self.options.includes(self.persons[number].id) {
             return false;
         }
+        self.scene.known.release(frame, track.image, &track.detection.pixels);
+        let positions = self.own_positions(&self.persons[number], &track.positions);
+        let person = &mut self.persons[number];
         let known = person.created < frame.stamp;
         let ownership = self.assignment.ownership(own, &self.scene.known);
         let detected = Detected { detection: &track.detection, map: &self.detector.map };
         let placed = PlacedDetection { index: 0, root: track.place, detection: track.detection.clone() };
         let depth_frame = &Frame { colors: &[], ..*frame };
         let came = if !track.positions.is_empty() {
-            let frame = &Frame { positions: &track.positions, ..*depth_frame };
+            let frame = &Frame { positions: &positions, ..*depth_frame };
             person.tracker.start_at_positions(frame, ownership, !known)
         } else if person.present {
             person.tracker.recover(depth_frame, ownership, track.image, placed)

@@ -20,7 +20,7 @@ use crate::config::Config;
 use crate::detect::{BoundDetector, Detect, DetectError};
 use crate::error::{TrackError, Unexpected};
 use crate::math::Vec3;
-use crate::observation::frame::{DetectedPerson, Frame};
+use crate::observation::frame::{DetectedPerson, Frame, PositionRelation};
 use crate::threads::Threads;
 use crate::tracker::BodyTracker;
 use births::NEW;
@@ -185,7 +185,11 @@ impl People {
         }
         self.assign_pixels(frame);
         let of_detection = self.match_detections(frame);
-        self.follow(frame, own, &of_detection);
+        let detected = frame.detections.iter().zip(&of_detection).filter_map(|(detection, person)| {
+            person.map(|number| (number, self.own_positions(&self.persons[number], detection.positions)))
+        });
+        let detected: Vec<_> = detected.collect();
+        self.follow(frame, own, &detected);
         for person in &self.persons {
             if let Some((image, pixels)) = person.tracker.moved_to.as_ref().filter(|_| person.present) {
                 self.scene.known.release(frame, *image, pixels);
@@ -225,10 +229,9 @@ impl People {
         }
         let tracked: Vec<usize> = (0..self.persons.len()).filter(|number| self.persons[*number].is_tracked()).collect();
         let distance = |detection: &DetectedPerson, person: &Person| {
-            let body = person.tracker.body();
-            let each = detection.positions.iter().filter(|of| of.site < body.sites().len());
-            let sum: f64 = each.map(|of| body.site_position(&person.expected, of.site).distance(of.position)).sum();
-            if detection.positions.is_empty() { f64::INFINITY } else { sum / detection.positions.len() as f64 }
+            let (body, positions) = (person.tracker.body(), self.own_positions(person, detection.positions));
+            let each = positions.iter().map(|of| body.site_position(&person.expected, of.site).distance(of.position));
+            if positions.is_empty() { f64::INFINITY } else { each.sum::<f64>() / positions.len() as f64 }
         };
         let costs = |detection| tracked.iter().map(|number| distance(detection, &self.persons[*number])).collect();
         let costs: Vec<Vec<f64>> = frame.detections.iter().map(costs).collect();
@@ -236,20 +239,17 @@ impl People {
         assigned.into_iter().map(|column| column.map(|column| tracked[column])).collect()
     }
 
-    /// Steps every tracker with its own pixels and points, and with the detections that show the person.
-    fn follow(&mut self, frame: &Frame, own: &[(usize, Frame)], of_detection: &[Option<usize>]) {
+    /// Steps every tracker with its own pixels and points, and with the positions in the detections that show the person (number).
+    fn follow(&mut self, frame: &Frame, own: &[(usize, Frame)], detected: &[(usize, Vec<PositionRelation>)]) {
         let (assignment, scene) = (&self.assignment, &self.scene.known);
         let nothing = Frame::empty(frame.stamp);
         let work = |(number, person): (usize, &mut Person)| {
             if person.present {
                 let ownership = assignment.ownership(number, scene);
                 let own = own.iter().find(|(id, _)| *id == person.id).map_or(&nothing, |(_, own)| own);
-                let count = person.tracker.body().sites().len();
-                let detection = of_detection.iter().position(|person| *person == Some(number));
-                let detected = detection.map_or(&[][..], |detection| frame.detections[detection].positions);
-                let detected: Vec<_> = detected.iter().filter(|of| of.site < count).copied().collect();
+                let detected = detected.iter().find(|(of, _)| *of == number).map_or(&[][..], |(_, detected)| detected);
                 let positions = joined(frame.positions, own.positions);
-                let (clouds, positions) = (joined(frame.clouds, own.clouds), joined(&positions, &detected));
+                let (clouds, positions) = (joined(frame.clouds, own.clouds), joined(&positions, detected));
                 let rays = joined(frame.rays, own.rays);
                 // With several persons, the frame's color pictures only serve to identify them.
                 let of = Frame { clouds: &clouds, positions: &positions, rays: &rays, colors: own.colors, ..*frame };

@@ -91,10 +91,10 @@ impl Tracker {
 
     /// Forgets everybody else, and the scene. The next frame may have any stamp.
     fn restarted(&mut self) -> &Estimate {
-        let People { persons, scene, tentative, last_detection, stamp, .. } = &mut self.people;
+        let People { persons, scene, tentative, detector, last_detection, stamp, refusal, .. } = &mut self.people;
         persons.truncate(1);
         (*scene, *tentative) = Default::default();
-        (*last_detection, *stamp) = (None, None);
+        (*last_detection, *stamp, *refusal, detector.error) = (None, None, None, None);
         let person = self.followed();
         (person.present, person.stays) = (true, true);
         person.created = f64::NEG_INFINITY;
@@ -169,6 +169,27 @@ mod tests {
             with_frame(pixels, number as f64 / 30.0, |frame| tracker.step(frame).unwrap().sources[0].count)
         };
         images.iter().enumerate().map(feed).collect()
+    }
+
+    #[test]
+    fn detections_of_others_have_the_sites_of_their_bodies_after_an_edit_of_the_followed_one() {
+        let (model, poses) = standing();
+        let aside = moved(&poses, 2.0 * Vec3::X);
+        let sites = 0..model.body.sites().len();
+        let all: Vec<_> = sites.map(|site| (site, model.body.site_position(&aside, site))).collect();
+        let mut tracker = Tracker::new(model.body.clone(), Config::default()).unwrap();
+        tracker.reset_pose(&poses).unwrap();
+        tracker.people.add(&all, false).unwrap();
+        tracker.remove_limb("l_upperarm").unwrap();
+        let (edited, other) = (tracker.body(), &tracker.people.persons[1]);
+        assert!(edited.sites().len() < model.body.sites().len());
+        let named = edited.sites().iter().enumerate().map(|(site, of)| {
+            let position = all[model.body.site_index(&of.name).unwrap()].1;
+            crate::PositionRelation { site, position, weight: 1.0, bias: 0.0, source: 0 }
+        });
+        let own = tracker.people.own_positions(other, &named.collect::<Vec<_>>());
+        assert_eq!(own.len(), edited.sites().len());
+        assert!(own.iter().all(|of| of.position == all[of.site].1), "{own:?}");
     }
 
     #[test]

@@ -59,9 +59,8 @@ impl BodyTracker {
 
     /// Updates the tracker after a change of the body, and closes the joints from the root outwards; orientations are kept.
     fn edited(&mut self) {
+        self.jump();
         let Self { model, motion, fit, hypotheses, relocalizer, sizes, assessor, estimate, .. } = self;
-        // The motion restarts because the previous poses belong to another body.
-        motion.forget();
         hypotheses.restart();
         relocalizer.detector.bind(&model.body);
         if motion.poses.is_empty() {

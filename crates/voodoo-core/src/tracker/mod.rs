@@ -119,6 +119,7 @@ impl BodyTracker {
 
     fn restart(&mut self, body: Body, world_from_limb: Vec<Pose>, start: Start) {
         self.model.adopt(body);
+        self.jump();
         self.motion.restart(world_from_limb);
         self.observer.clear();
         self.fit.clear();
@@ -143,6 +144,12 @@ impl BodyTracker {
             self.relocate(frame, ownership);
             self.track(frame, ownership);
         }
+    }
+
+    /// Forgets the motion: the poses before belong to another place, or to another body.
+    fn jump(&mut self) {
+        self.motion.forget();
+        self.before.stamp = f64::NAN;
     }
 
     /// Restarts the track at the current detection, in the sizes that were set or, where they clearly differ, in the detected
@@ -182,6 +189,7 @@ impl BodyTracker {
         detection: PlacedDetection,
         known: bool,
     ) -> bool {
+        self.moved_to = None;
         self.relocalizer.detection = Some(detection);
         let set = known.then_some(&self.model.body);
         let Some((body, poses, known)) = self.relocalizer.fit_detected(&self.model, set) else { return false };
@@ -404,14 +412,14 @@ impl BodyTracker {
         let observation = observer.gather(frame, motion.origin, &bounds, ownership, config);
         let context = Context { config, model, observation, previous: &[], time_scale: 1.0 };
         fit.match_all(context, poses, config.max_steps, true);
-        assessor.exchange();
+        assessor.set_aside();
         assessor.assess(context, &fit.correspondences, poses, None);
         let moves = even_lost || assessor.status != Status::Lost;
         if moves {
             motion.poses.clone_from_slice(poses);
-            motion.forget();
+            self.jump();
         } else {
-            assessor.exchange();
+            assessor.take_back();
             self.moved_to = None;
         }
         moves

@@ -77,6 +77,7 @@ fn edits_keep_the_track() {
         edit(&mut tracker);
         let after = tracker.estimate().clone();
         assert_eq!((after.status, after.stamp, after.steps), (before.status, before.stamp, 0), "edit {number}");
+        assert!(tracker.limb_motion().is_none(), "edit {number}");
         let limbs = tracker.body().limbs().len();
         assert!(after.world_from_limb.len() == limbs && after.limb_status.len() == limbs, "edit {number}");
         let (then, now) = (&before.world_from_limb[0], &after.world_from_limb[0]);
@@ -107,9 +108,16 @@ fn a_lost_body_is_found_beside_its_place_and_no_board_of_its_size_is() {
         let moved = poses[0].translation.distance(tracker.estimate().world_from_limb[0].translation);
         assert!(moved < 0.1, "{width} m wide: moved by {moved} m");
     }
+    let mut jumps = 0;
     for frame in 20..30 {
+        let before = tracker.estimate().world_from_limb.clone();
         feed(&mut tracker, &person, frame);
+        if farthest(&tracker.estimate().world_from_limb, &before) > 0.3 {
+            assert!(tracker.limb_motion().is_none(), "a jump is no motion");
+            jumps += 1;
+        }
     }
+    assert_eq!(jumps, 1);
     let off = farthest(&tracker.estimate().world_from_limb, &aside);
     assert!(tracker.estimate().status == Status::Tracking && off < 0.05, "{off} m");
 }

@@ -60,8 +60,8 @@ pub(super) struct Assessor {
     internal: Vec<LimbStatus>,
     /// Log odds that each limb is right, of which its reported status and probability are functions.
     log_odds: Vec<f64>,
-    /// The three while another pose is assessed.
-    aside: (Status, Vec<LimbStatus>, Vec<f64>),
+    /// All of these while another pose is assessed.
+    aside: (Vec<LimbFilter>, [f64; 2], Status, Vec<LimbStatus>, Vec<f64>),
     exclusive: Exclusive,
     raycasters: Vec<LimbRaycaster>,
     supports: Vec<LimbSupport>,
@@ -89,13 +89,20 @@ impl Assessor {
         self.round = [ROUND[1]; 2];
     }
 
-    /// Exchanges what the last assessment found for what was set aside before. Only the current frame is evidence then.
-    pub(super) fn exchange(&mut self) {
-        let Self { status, internal, log_odds, aside, .. } = self;
-        std::mem::swap(status, &mut aside.0);
-        std::mem::swap(internal, &mut aside.1);
-        std::mem::swap(log_odds, &mut aside.2);
+    /// Sets the assessment aside for that of another pose, for which only the current frame is evidence.
+    pub(super) fn set_aside(&mut self) {
+        self.take_back();
         self.moved();
+    }
+
+    /// Takes back the assessment that was set aside.
+    pub(super) fn take_back(&mut self) {
+        let Self { limbs, round, status, internal, log_odds, aside, .. } = self;
+        std::mem::swap(limbs, &mut aside.0);
+        std::mem::swap(round, &mut aside.1);
+        std::mem::swap(status, &mut aside.2);
+        std::mem::swap(internal, &mut aside.3);
+        std::mem::swap(log_odds, &mut aside.4);
     }
 
     /// Sets the body and all its limbs to lost.
