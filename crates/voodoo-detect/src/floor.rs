@@ -144,6 +144,7 @@ fn refined(level: &[Vec3], plane: Ground, fraction: f64) -> Ground {
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
+    use crate::segmentation::Segmentation;
     use voodoo_core::Camera;
     use voodoo_core::Surroundings;
     use voodoo_core::math::Pose;
@@ -155,6 +156,11 @@ mod tests {
 
     /// The floor that is found for a camera tilted down by `tilt` radians, 1.2 m above the floor of a room that ends at 4.5 m.
     fn found(tilt: f64, is_visible: impl Fn(Vec3) -> bool) -> Option<Ground> {
+        found_before(tilt, is_visible, false)
+    }
+
+    /// The same where all of it is the known scene, if `known`.
+    fn found_before(tilt: f64, is_visible: impl Fn(Vec3) -> bool, known: bool) -> Option<Ground> {
         let (sin, cos) = tilt.sin_cos();
         let up = Vec3::new(0.0, -cos, -sin);
         let pixels: Vec<f32> = (0..EDGE * EDGE)
@@ -168,7 +174,6 @@ mod tests {
                 if is_visible(z * ray) { (z + 0.01 * (index as f64 * 12.9898).sin()) as f32 } else { 0.0 }
             })
             .collect();
-        let mut view = ThinnedImage::default();
         let half = 0.5 * (EDGE as f64 - 1.0);
         let camera = Camera::pinhole(EDGE, EDGE, [FOCAL, FOCAL, half, half]).unwrap();
         let image = DepthImage {
@@ -179,8 +184,16 @@ mod tests {
             weight: 1.0,
             source: 0,
         };
-        view.read(&image, &Surroundings::default());
-        find_floor(&view, -Vec3::Y)
+        let mut segmentation = Segmentation::default();
+        let background: &[f32] = if known { &pixels } else { &[] };
+        segmentation.find(&image, &Surroundings { background, ..Surroundings::default() });
+        assert!(!known || segmentation.candidates.is_empty(), "the known scene is nobody");
+        segmentation.floor
+    }
+
+    #[test]
+    fn the_floor_of_a_known_scene_is_found() {
+        assert_eq!(found_before(0.25, |_| true, true), found(0.25, |_| true));
     }
 
     #[test]

@@ -32,6 +32,8 @@ impl Segmentation {
         let up = around.up.map_or(-Vec3::Y, |up| camera_from_world.rotation * up);
         self.floor = given.or_else(|| find_floor(&self.view, up));
         self.up = self.floor.map_or(up, |floor| floor.normal);
+        // The floor is a part of the known scene.
+        self.view.remove_explained(around);
         if let Some(floor) = &self.floor {
             self.view.remove_floor(floor);
         }
