@@ -28,8 +28,11 @@ pub(crate) struct Background {
     pub frames: Vec<u8>,
     /// Stamp since which the camera has been at its position, seconds; `None` in the first frame.
     pub since: Option<f64>,
-    /// Whether the whole image of the second frame was learned.
+    /// Whether the whole image of the second frame was learned, and the row that was learned last.
     pub filled: bool,
+    pub row: usize,
+    /// Stamp of the last image, seconds.
+    pub(super) seen: f64,
 }
 
 /// The backgrounds of all depth images, in the order of the frame.
@@ -119,6 +122,9 @@ impl Backgrounds {
             if self.of_image(image).is_none() {
                 self.carry_over(image, frame);
             }
+            if let Some(background) = self.of_image_mut(image) {
+                background.seen = frame.stamp;
+            }
         }
     }
 }
@@ -142,8 +148,8 @@ mod tests {
             source: 0,
         };
         let mut backgrounds = Backgrounds::default();
-        let mut register = |images: &[DepthImage], known: bool| {
-            let frame = Frame { images, ..Frame::empty(0.0) };
+        let mut register = |stamp: f64, images: &[DepthImage], known: bool| {
+            let frame = Frame { images, ..Frame::empty(stamp) };
             if known {
                 learn(&mut backgrounds, &frame, |_| true);
             }
@@ -154,9 +160,13 @@ mod tests {
             })
         };
         let both = [Some(16), Some(16), None];
-        assert_eq!(register(&[image(0.0), image(1.0)], true), both);
-        assert_eq!(register(&[], false), both);
-        assert_eq!(register(&[image(1.0)], false), both, "the other one is silent");
-        assert_eq!(register(&[image(2.0), image(1.0)], false), [None, Some(16), Some(0)], "the other one moved");
+        assert_eq!(register(0.0, &[image(0.0), image(1.0)], true), both);
+        assert_eq!(register(0.1, &[], false), both);
+        assert_eq!(register(0.2, &[image(1.0)], false), both, "the other one is silent");
+        let all = [Some(16), Some(16), Some(0)];
+        assert_eq!(register(0.3, &[image(2.0)], false), all, "cameras may deliver in frames of their own");
+        assert_eq!(register(0.4, &[image(1.0), image(2.0)], false), all);
+        assert_eq!(register(3.5, &[image(1.0), image(2.0)], false), all);
+        assert_eq!(register(3.6, &[image(3.0)], false), [None, Some(16), Some(0)], "the first one has gone");
     }
 }

@@ -7,6 +7,8 @@ use crate::math::{Vec3, reset};
 
 /// A camera that moved by more than this between two images counts as a different camera: meters, and radians.
 const LEAPS: (f64, f64) = (0.5, 0.5);
+/// A background without an image for this time belongs to no camera any more, seconds.
+const GONE: f64 = 3.0;
 /// Surfaces nearer to the camera plane than this are not carried over, meters: no sensor measures there.
 const NEAREST_CARRIED: f32 = 0.1;
 /// The two sides of a crack belong to one surface when their depths differ by less than this, meters.
@@ -14,7 +16,7 @@ const CRACK_STEP: f32 = 0.15;
 
 impl Backgrounds {
     /// Gives an image that has none a background. If the same camera learned one at another pose nearby, that is carried over to the
-    /// current pose; otherwise the background is empty. Reuses the slot of a background that no image of the frame has.
+    /// current pose; otherwise the background is empty, in the slot of one that belongs to no camera any more, if there is one.
     pub(super) fn carry_over(&mut self, image: &DepthImage, frame: &Frame) {
         let gone = |background: &Background| !frame.images.iter().any(|image| background.fits(image));
         let leap = |background: &Background| {
@@ -23,7 +25,9 @@ impl Backgrounds {
             if is_near { meters / LEAPS.0 + radians / LEAPS.1 } else { f64::INFINITY }
         };
         let left = self.images.iter().enumerate().filter(|(_, background)| gone(background));
-        let nearest = left.map(|(index, background)| (index, leap(background))).min_by(|a, b| a.1.total_cmp(&b.1));
+        let left = left.map(|(index, background)| (index, leap(background), frame.stamp - background.seen));
+        let usable = left.filter(|(_, leap, silent)| leap.is_finite() || *silent > GONE);
+        let nearest = usable.map(|(index, leap, _)| (index, leap)).min_by(|a, b| a.1.total_cmp(&b.1));
         let (index, leap) = nearest.unwrap_or((self.images.len(), f64::INFINITY));
         if index == self.images.len() {
             self.images.push(Background::default());
@@ -179,7 +183,7 @@ mod tests {
         let mut backgrounds = Backgrounds::default();
         for (x, pending) in [(0.0, 2.0), (1.0, 0.0)] {
             let images = [image(&pixels, &camera, pose(x, 0.0))];
-            backgrounds.register(&Frame { images: &images, ..Frame::empty(x) });
+            backgrounds.register(&Frame { images: &images, ..Frame::empty(4.0 * x) });
             let background = &mut backgrounds.images[0];
             if x == 0.0 {
                 background.pending.fill(pending);

@@ -28,7 +28,6 @@ const SAME: f32 = 0.05;
 pub(super) struct SceneModel {
     /// The learned scene.
     pub(super) known: Backgrounds,
-    row: usize,
     /// Whether the last frame that was learned showed nobody new: nothing but persons and the known scene.
     pub(super) shows_nobody_new: bool,
 }
@@ -41,12 +40,12 @@ impl SceneModel {
 
     /// Learns some rows in pixels that no person owns; the whole image in the second frame of a camera at its position.
     pub(super) fn learn(&mut self, frame: &Frame, owners: &[Vec<u16>]) {
-        self.row = (self.row + 1) % LEARNED_ROWS;
         // Pixels that were learned, and those of them that show neither a person nor the known scene.
         let (mut learned, mut unexplained) = (0, 0);
         for (image, owners) in frame.images.iter().zip(owners) {
             let Some(background) = self.known.of_image_mut(image) else { continue };
-            let Background { depth: known, pending, frames, since, filled, .. } = background;
+            let Background { depth: known, pending, frames, since, filled, row, .. } = background;
+            *row = (*row + 1) % LEARNED_ROWS;
             if since.is_none() {
                 *since = Some(frame.stamp);
                 continue;
@@ -59,7 +58,7 @@ impl SceneModel {
                     *learned = z;
                 }
             }
-            for row in (self.row..image.camera.height()).step_by(LEARNED_ROWS) {
+            for row in (*row..image.camera.height()).step_by(LEARNED_ROWS) {
                 learned += image.camera.width();
                 let (mut new, mut width) = (0, 0.0);
                 for index in row * image.camera.width()..(row + 1) * image.camera.width() {
