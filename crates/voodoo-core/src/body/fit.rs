@@ -1,7 +1,7 @@
 //! Fits pose and sizes of a body to named positions in the world.
 
 use super::{Body, Joint, JointKind};
-use crate::body::kinematics::joint_turn;
+use crate::body::kinematics::{hinge_axis, joint_turn};
 use crate::error::{TrackError, Unexpected};
 use crate::math::{Aabb, Mat3, Moments, Pose, Quat, Vec3, is_place};
 
@@ -230,7 +230,7 @@ impl Body {
             far.max_by(|a, b| away(a.0).total_cmp(&away(b.0))).map(|(_, position)| position)
         })?;
         let normal = (bend - start).normalize_or_zero().cross((end - bend).normalize_or_zero());
-        (normal.length() > BENT).then(|| (joint.parent_from_joint.rotation * Vec3::X, normal.normalize()))
+        (normal.length() > BENT).then(|| (joint.parent_from_joint.rotation * hinge_axis(joint), normal.normalize()))
     }
 
     /// Moves the landmarks of a limb to their measured positions and stretches its shape accordingly.
