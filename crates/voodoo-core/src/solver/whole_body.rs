@@ -143,7 +143,7 @@ impl WholeBody {
             let rests = part.match_caps[1] && joint.is_some_and(|joint| joint.kind() == JointKind::Elliptic);
             self.rests.push(Rest {
                 rotation: joint.map_or(Quat::IDENTITY, |joint| joint.parent_from_limb_at_rest().rotation),
-                fraction: if rests { to_rest(context, TO_REST, measured_fraction) } else { 0.0 },
+                fraction: if rests { to_rest(context.time_scale, TO_REST, measured_fraction) } else { 0.0 },
             });
             let measured_fraction = measured_fraction.max(HIDDEN_MOTION);
             self.joint_sigmas.push(motion * measured_fraction * time_scale * config.motion_scale);
@@ -165,7 +165,8 @@ impl WholeBody {
             let mut measured = leg.ends.iter().map(visible).sum::<f64>();
             for (limb, rotation) in [leg.lower, leg.upper].into_iter().zip(rotations.into_iter().rev()) {
                 measured += visible(&limb);
-                let fraction = to_rest(context, LEG_TO_REST, ((measured + self.sites[limb]) / FREE_WEIGHT).min(1.0));
+                let fraction =
+                    to_rest(context.time_scale, LEG_TO_REST, ((measured + self.sites[limb]) / FREE_WEIGHT).min(1.0));
                 self.rests[limb] = Rest { rotation, fraction };
             }
         }
@@ -173,8 +174,8 @@ impl WholeBody {
 }
 
 /// Fraction of the way to its rest that a limb moves in a frame of which this fraction is measured, at `rate` where nothing is.
-fn to_rest(context: Context, rate: f64, measured: f64) -> f64 {
-    ((1.0 - measured) * rate * context.time_scale).min(1.0)
+fn to_rest(time_scale: f64, rate: f64, measured: f64) -> f64 {
+    (1.0 - measured) * (1.0 - (1.0 - rate).powf(time_scale))
 }
 
 /// Gain of the prior for small deviations from the prediction, in this step.
@@ -185,4 +186,16 @@ fn still_prior_gain(problem: Problem, information: f64) -> f64 {
     // When points lie closer to the body than `point_sigma` suggests, a small deviation is motion and not noise.
     let scatter = if holds { correspondences.scatter(config.kernel_end).unwrap_or(0.0) } else { 0.0 };
     config.still_prior_gain * (scatter * information / (ROUGH * ROUGH)).min(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hidden_limb_rests_as_soon_at_any_rate_of_frames() {
+        let left = |time_scale: f64| 1.0 - to_rest(time_scale, TO_REST, 0.0);
+        assert!((left(2.0) - left(1.0) * left(1.0)).abs() < 1e-12 && left(1e3) >= 0.0);
+        assert_eq!(to_rest(4.0, TO_REST, 1.0), 0.0);
+    }
 }
