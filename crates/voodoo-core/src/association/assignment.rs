@@ -86,11 +86,17 @@ impl Assignment {
         let members = &self.members[index];
         let kept = sampled_count(members.len(), config);
         matches.candidate.clear();
-        matches.reserve(config.max_limb_points.min(candidates.len()));
+        matches.left_out.clear();
+        matches.reserve(config.max_limb_points.min(candidates.len()), candidates.len());
         if kept == members.len() {
             matches.candidate.extend_from_slice(members);
         } else {
-            matches.candidate.extend((0..kept).map(|sample| members[sample * members.len() / kept]));
+            let sample = |number: usize| number * members.len() / kept;
+            matches.candidate.extend((0..kept).map(|number| members[sample(number)]));
+            for number in 0..kept {
+                let others = &members[sample(number) + 1..sample(number + 1)];
+                matches.left_out.extend(others.iter().map(|candidate| [*candidate, number as u32]));
+            }
         }
         pick(candidates, matches);
         reset(&mut matches.own, matches.candidate.len(), 1.0);

@@ -11,6 +11,8 @@ use crate::shape::SurfaceBatch;
 pub(crate) struct LimbMatches {
     /// Index of each point among the candidates.
     pub candidate: Vec<u32>,
+    /// Index among the candidates of every point that is not sampled, and the number of the sampled point that stands for it.
+    pub left_out: Vec<[u32; 2]>,
     /// Measured points.
     pub measured: Points,
     /// Weights of the measurements, before any pair is rejected.
@@ -129,8 +131,9 @@ pub(crate) struct Correspondences {
 }
 
 impl LimbMatches {
-    /// Reserves capacity for `len` pairs.
-    pub(crate) fn reserve(&mut self, len: usize) {
+    /// Reserves capacity for `len` pairs of `all` points.
+    pub(crate) fn reserve(&mut self, len: usize, all: usize) {
+        self.left_out.reserve(all.saturating_sub(self.left_out.len()));
         self.candidate.reserve(len.saturating_sub(self.candidate.len()));
         self.measured.reserve(len);
         self.base_weight.reserve(len.saturating_sub(self.base_weight.len()));
@@ -175,13 +178,13 @@ fn in_lanes<const N: usize>(first: &[f32], second: &[f32], values: impl Fn(f32, 
 }
 
 impl Correspondences {
-    /// Reserves capacity for `points` surface matches of each limb, and as much for color edges as `other` has.
-    pub(crate) fn reserve(&mut self, points: usize, other: &Self) {
+    /// Reserves capacity for `points` surface matches of each limb, of `all` points, and as much for color edges as `other` has.
+    pub(crate) fn reserve(&mut self, points: usize, all: usize, other: &Self) {
         // Exactly as much: each of two that are exchanged would otherwise grow beyond the other.
         self.regions.reserve_exact(other.regions.capacity().saturating_sub(self.regions.len()));
         self.region_support.reserve_exact(other.region_support.capacity().saturating_sub(self.region_support.len()));
         self.limbs.resize_with(other.limbs.len(), LimbMatches::default);
-        self.limbs.iter_mut().for_each(|limb| limb.reserve(points));
+        self.limbs.iter_mut().for_each(|limb| limb.reserve(points, all));
     }
 
     /// Total weight of a limb's measurements: its points and its sites.
@@ -236,7 +239,7 @@ mod tests {
         };
         let (mut current, mut tried) = (with_room(7), with_room(10));
         for _ in 0..40 {
-            tried.reserve(80, &current);
+            tried.reserve(80, 80, &current);
             std::mem::swap(&mut current, &mut tried);
         }
         let limb = &current.limbs[0];

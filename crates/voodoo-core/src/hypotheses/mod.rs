@@ -128,7 +128,7 @@ impl Hypotheses {
         }
         let most = context.observation.candidates.len();
         self.rough.make_room(most);
-        self.refined.matched.reserve(most.min(context.config.max_limb_points), &fit.correspondences);
+        self.refined.matched.reserve(most.min(context.config.max_limb_points), most, &fit.correspondences);
     }
 
     /// Whether the frame contradicts an arm or leg: its alternatives are tested.
@@ -166,20 +166,25 @@ impl Hypotheses {
 mod tests {
     use super::refined::REFINE;
     use super::*;
+    use crate::config::Config;
     use crate::testing::{before_wall, farthest, first_arm, raised, standing, with_context, without_background};
 
     /// Runs hypotheses that start with hanging arms on rendered images of the poses in `frames`. Returns the poses and the number
     /// of ICP steps of every frame.
     fn improved(frames: &[&Vec<Pose>]) -> Vec<(Vec<Pose>, usize)> {
+        improved_with(&without_background(), frames)
+    }
+
+    /// The same with another configuration.
+    fn improved_with(config: &Config, frames: &[&Vec<Pose>]) -> Vec<(Vec<Pose>, usize)> {
         let (model, mut poses) = standing();
-        let config = without_background();
-        let (mut hypotheses, mut fit) = (Hypotheses::default(), Fit::new(&config).unwrap());
+        let (mut hypotheses, mut fit) = (Hypotheses::default(), Fit::new(config).unwrap());
         hypotheses.restart();
         let mut found = Vec::new();
         for truth in frames {
             let (pixels, previous) = (before_wall(&model.body, truth), poses.clone());
             let mut predicted = previous.clone();
-            with_context(&pixels, &config, &model, &previous, |context| {
+            with_context(&pixels, config, &model, &previous, |context| {
                 fit.match_last(context, &poses, true);
                 let steps = hypotheses.improve(context, &mut fit, &mut poses, &mut predicted, None);
                 assert_eq!(poses == previous, predicted == previous, "poses and prediction change together");
@@ -213,6 +218,19 @@ mod tests {
         let (chain, back) = (&model.extremities[first_arm(&model)], &found[2].0);
         let (left, expected) = (chain.end(back).distance(chain.end(&poses)), end.distance(chain.end(&poses)));
         assert!(left < 0.2 && expected > 0.8, "{left} of {expected}");
+    }
+
+    #[test]
+    fn a_raised_arm_is_found_where_limbs_have_more_points_than_are_used() {
+        let (model, poses) = standing();
+        let (truth, _) = raised(&model, &poses, 0.2);
+        for (sampling_factor, max_limb_points) in [(2, 1000), (1, 60)] {
+            let config = Config { sampling_factor, max_limb_points, ..without_background() };
+            let (found, _) = &improved_with(&config, &[&truth])[0];
+            assert!(farthest(found, &truth) < 0.02, "{sampling_factor}: {}", farthest(found, &truth));
+            // What is not used is explained as its neighbors are.
+            assert_eq!(improved_with(&config, &[&poses])[0].1, 0);
+        }
     }
 
     #[test]

@@ -55,13 +55,12 @@ impl<'a> Objective<'a> {
             + floor.map_or(0.0, |floor| stance_cost(floor, model, poses, limb))
     }
 
-    /// Cost of the matched poses of the whole body. A point that no limb explains costs a patch of its weight.
+    /// Cost of the matched poses of the whole body. A point that no limb explains costs the surface for which it stands.
     pub(crate) fn body(&self) -> f64 {
-        let weights = &self.context.observation.candidates.weight;
-        let total: f64 = weights.iter().map(|weight| f64::from(*weight)).sum();
-        let explained: f64 = self.correspondences.limbs.iter().map(cost_of_points).sum();
+        let candidates = self.context.observation.candidates;
+        let explained: f64 = self.correspondences.limbs.iter().map(|limb| cost_of_points(limb, candidates)).sum();
         let limbs = (0..self.poses.len()).map(|limb| self.limb(self.poses, limb));
-        self.clutter * (PATCH * total + explained) + limbs.sum::<f64>()
+        self.clutter * (PATCH * candidates.area() + explained) + limbs.sum::<f64>()
     }
 }
 
@@ -118,10 +117,10 @@ mod tests {
             with_context(pixels, &config, &model, &poses, |context| {
                 let mut fit = Fit::new(&config).unwrap();
                 fit.match_last(context, &poses, true);
-                let all: f32 = context.observation.candidates.weight.iter().sum();
+                let all = context.observation.candidates.area();
                 let correspondences = &fit.correspondences;
                 let objective = Objective { context, correspondences, poses: &poses, clutter: 1.0, regions: None };
-                (objective.body(), PATCH * f64::from(all))
+                (objective.body(), PATCH * all)
             })
         };
         let alone = before_wall(&model.body, &poses);

@@ -29,19 +29,22 @@ impl Unexplained {
         points.make_room(candidates.len());
         reset(nearest, candidates.len(), f32::INFINITY);
         for matches in &correspondences.limbs {
-            for (candidate, distance) in matches.candidate.iter().zip(&matches.surface.signed_distance) {
-                let nearest = &mut nearest[*candidate as usize];
+            let distances = &matches.surface.signed_distance;
+            let mut explain = |candidate: u32, distance: f32| {
+                let nearest = &mut nearest[candidate as usize];
                 // A rejected match (to a cap inside the body) still explains its point.
                 *nearest = nearest.min(distance.abs());
-            }
+            };
+            matches.candidate.iter().zip(distances).for_each(|(candidate, distance)| explain(*candidate, *distance));
+            matches.left_out.iter().for_each(|[candidate, of]| explain(*candidate, distances[*of as usize]));
         }
         for (index, distance) in nearest.iter().enumerate() {
             if f64::from(*distance) > EXPLAINED {
                 let all = &candidates.points;
-                points.push([all.x[index], all.y[index], all.z[index]], f64::from(candidates.weight[index]));
+                points.push([all.x[index], all.y[index], all.z[index]], f64::from(candidates.area[index]));
             }
         }
-        let all: f64 = candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
+        let all = candidates.area();
         let excess = points.total() / (USUAL_CLUTTER * all).max(f64::MIN_POSITIVE);
         *clutter = (1.0 - excess.max(1.0).ln() / USUAL_COST).max(0.0);
     }

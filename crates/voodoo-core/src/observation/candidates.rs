@@ -18,6 +18,8 @@ pub(crate) struct Candidates {
     pub points: Points,
     /// Weights.
     pub weight: Vec<f32>,
+    /// The surface for which each point stands, in patches: its weight, without the precision of a depth image.
+    pub area: Vec<f32>,
     /// The limb they are known to be on, or [`ANY_LIMB`].
     pub limb: Vec<u16>,
     /// Index of the source of each point.
@@ -77,6 +79,11 @@ impl Candidates {
         self.thin();
     }
 
+    /// The surface for which all points stand, in patches.
+    pub(crate) fn area(&self) -> f64 {
+        self.area.iter().map(|area| f64::from(*area)).sum()
+    }
+
     /// A subset of approximately [`ROUGH_POINTS`] pixels with the same total weight where depth images have many; otherwise all
     /// points.
     pub(crate) fn subsampled(&self) -> &Self {
@@ -86,6 +93,7 @@ impl Candidates {
     fn clear(&mut self) {
         self.points.clear();
         self.weight.clear();
+        self.area.clear();
         self.limb.clear();
         self.source.clear();
         self.cameras.clear();
@@ -114,12 +122,14 @@ impl Candidates {
     fn take(&mut self, others: &Self, index: usize, times: f32) {
         let Points { x, y, z } = &others.points;
         let point = [x[index], y[index], z[index]];
-        self.push(point, times * others.weight[index], others.limb[index], others.source[index]);
+        let [weight, area] = [&others.weight, &others.area].map(|of| times * of[index]);
+        self.push(point, [weight, area], others.limb[index], others.source[index]);
     }
 
-    fn push(&mut self, point: [f32; 3], weight: f32, limb: u16, source: u16) {
+    fn push(&mut self, point: [f32; 3], [weight, area]: [f32; 2], limb: u16, source: u16) {
         self.points.push(point);
         self.weight.push(weight);
+        self.area.push(area);
         self.limb.push(limb);
         self.source.push(source);
     }
@@ -138,9 +148,10 @@ impl Candidates {
                 kept += 1;
             }
         }
-        // Weight, limb and source are the same for all of them.
+        // Weight, area, limb and source are the same for all of them.
         self.points.resize(kept);
         self.weight.truncate(kept);
+        self.area.truncate(kept);
         self.limb.truncate(kept);
         self.source.truncate(kept);
     }
@@ -156,7 +167,7 @@ impl Candidates {
             let point = rotation * cloud.points.get(index) + shift;
             let point = point.to_array().map(|value| value as f32);
             if cloud.scope != Scope::Free || gate.passes(point) && !others(index) {
-                self.push(point, cloud.weight as f32, limb, cloud.source);
+                self.push(point, [cloud.weight as f32; 2], limb, cloud.source);
             }
         }
     }
@@ -171,7 +182,7 @@ impl Candidates {
         let [fx, fy] = image.camera.focal();
         let patch = distance * distance / (fx * fy);
         let grid = Grid::new(VISIBLE_AREA / patch / max_points as f64);
-        let weight = image.weight * patch * (grid.rows * grid.columns) as f64 / REFERENCE_PATCH;
+        let area = patch * (grid.rows * grid.columns) as f64 / REFERENCE_PATCH;
         let stride = grid.columns;
         vectorized!({
             // The grid is fixed to the image: a box that moves takes the same pixels.
@@ -187,7 +198,8 @@ impl Candidates {
             }
         });
         let count = self.points.len();
-        self.weight.resize(count, weight as f32);
+        self.weight.resize(count, (image.weight * area) as f32);
+        self.area.resize(count, area as f32);
         self.limb.resize(count, ANY_LIMB);
         self.source.resize(count, image.source);
     }
@@ -270,10 +282,10 @@ mod tests {
         let mut all = Candidates::default();
         let pixels = 4 * ROUGH_POINTS;
         for index in 0..pixels {
-            all.push([index as f32, 0.0, 2.0], 0.5, ANY_LIMB, 1);
+            all.push([index as f32, 0.0, 2.0], [0.5; 2], ANY_LIMB, 1);
         }
         all.cameras = vec![(1000, Vec3::X), (pixels as u32, Vec3::Y)];
-        (0..3).for_each(|index| all.push([index as f32, 1.0, 0.0], 2.0, 7, 2));
+        (0..3).for_each(|index| all.push([index as f32, 1.0, 0.0], [2.0; 2], 7, 2));
         all.thin();
         let rough = all.subsampled();
         assert_eq!(rough.len(), ROUGH_POINTS + 3);

@@ -68,7 +68,7 @@ impl Trials {
         let Self { sample, nearest, distances, .. } = self;
         let candidates = context.observation.candidates;
         sample.clear();
-        sample.extend(&candidates.points, &candidates.weight);
+        sample.extend(&candidates.points, &candidates.area);
         sample.subsample(ROUGH_SAMPLE);
         reset(nearest, sample.weights.len(), f32::INFINITY);
         for limb in 0..poses.len() {

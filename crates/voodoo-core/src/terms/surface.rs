@@ -7,6 +7,7 @@ use super::{PATCH, Term};
 use crate::association::correspondence::{Correspondences, LimbMatches};
 use crate::body::Body;
 use crate::math::{LANES, Mat3, Pose, load, vectorized};
+use crate::observation::candidates::Candidates;
 use crate::terms::normal_equations::{LimbBlock, NormalEquations};
 use crate::visibility::EXPLAINED;
 
@@ -38,10 +39,17 @@ impl Term for Surface<'_> {
     }
 }
 
-/// The cost of the points matched to a limb less that of unexplained points, at the poses where they were matched, nats.
-pub(crate) fn cost_of_points(matches: &LimbMatches) -> f64 {
-    let pairs = matches.weight.iter().zip(&matches.surface.signed_distance);
-    pairs.map(|(weight, distance)| f64::from(*weight) * (unexplained(f64::from(*distance)) - PATCH)).sum()
+/// The cost of the points matched to a limb less that of unexplained points, at the poses where they were matched, nats. It counts
+/// the surface for which they stand, however precise they are.
+pub(crate) fn cost_of_points(matches: &LimbMatches, candidates: &Candidates) -> f64 {
+    let LimbMatches { candidate, left_out, weight, base_weight, surface, .. } = matches;
+    let pairs = weight.iter().zip(base_weight).zip(candidate.iter().zip(&surface.signed_distance));
+    let cost = |((weight, base_weight), (candidate, distance)): ((&f32, &f32), (&u32, &f32))| {
+        let area = candidates.area[*candidate as usize] * (weight / base_weight);
+        f64::from(area) * (unexplained(f64::from(*distance)) - PATCH)
+    };
+    let of_each = (candidate.len() + left_out.len()) as f64 / candidate.len().max(1) as f64;
+    of_each * pairs.map(cost).sum::<f64>()
 }
 
 /// Cost of a point of weight one at this distance from the surface, nats.

@@ -68,7 +68,7 @@ impl Exclusive {
                 *other != closest && distance(*other) <= EXPLAINED as f32 && !body.adjacent(*other, closest)
             };
             if near[place] == 1 || (0..count).find(rival).is_none() {
-                let candidate = f64::from(candidates.weight[place * step]) * step as f64;
+                let candidate = f64::from(candidates.area[place * step]) * step as f64;
                 weight[closest] += candidate;
                 clouds[closest] += if place * step < pixels { 0.0 } else { candidate };
             }
