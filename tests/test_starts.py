@@ -253,6 +253,19 @@ def test_legs_that_walk_are_found_and_furniture_is_not():
     assert not any(LegsStart().find(observed(scan, body=BODY, stamp=scan.stamp)) for scan, _ in walk())
 
 
+def test_the_sizes_of_a_start_from_legs_are_those_of_the_body():
+    """A child stays one: the start also scales the body."""
+    tracker = voodoo.Tracker(legs_body(1.2))
+    front_end = FrontEnd(tracker)
+    for scan, _ in walk():
+        front_end.step(RecordedFrame(scan.stamp, (scan,)))
+        if front_end.posed:
+            break
+    assert front_end.found.by == LegsStart.name
+    lengths = [limb.shape.length for limb in tracker.body.limbs if limb.name != "pelvis"]
+    assert lengths == pytest.approx([0.491 * 1.2] * 2, rel=0.02)
+
+
 def frames(*measurements, count, rate=30.0):
     for index in range(count):
         moved = tuple(replace(item, stamp=index / rate) for item in measurements)

@@ -15,7 +15,7 @@ import voodoo._core as _core
 from voodoo._core import TaperedEllipticCylinder
 from voodoo.errors import BodyError, naming
 from voodoo.measurements import FloatArray, LaserScan
-from voodoo.model.at_rest import proportion
+from voodoo.model.at_rest import proportion, sites_at_rest
 from voodoo.model.body import STATURE_M, Body, Joint, Place
 from voodoo.model.projection import transform
 from voodoo.pipeline.starts.base import FoundStart, StartFinder, StartFrame
@@ -190,12 +190,15 @@ def _found(legs: FloatArray, moved: FloatArray, scan: LaserScan, frame: StartFra
     height = float(scan.root_from_sensor[2, 3])
     ground = frame.settings.ground_z
     floor = height - _SHIN_HEIGHT_M if ground is None else ground
+    # The start also sets the body's sizes: they stay those of the stature that is known.
+    at_rest = sites_at_rest(frame.body)
+    stature = float(np.linalg.norm(at_rest["l_ankle"] - at_rest["l_hip"])) / _leg()
     joints: dict[str, FloatArray] = {}
     for side, sign, leg in zip("lr", (1.0, -1.0), sorted(legs, key=lambda leg: -float(leg @ left)), strict=True):
-        hip = np.array([*(middle + sign * _half_width() * STATURE_M * left), floor + _HIP * STATURE_M])
+        hip = np.array([*(middle + sign * _half_width() * stature * left), floor + _HIP * stature])
         shin = np.array([*leg, height])
         joints[f"{side}_hip"] = hip
-        joints[f"{side}_ankle"] = hip + (shin - hip) / np.linalg.norm(shin - hip) * _leg() * STATURE_M
+        joints[f"{side}_ankle"] = hip + (shin - hip) / np.linalg.norm(shin - hip) * _leg() * stature
     return FoundStart(joints, dict.fromkeys(joints, _SIGMA_M), LegsStart.name)
 
 
