@@ -218,7 +218,7 @@ def sweep(stamp, circles, pose):
     return LaserScan("scan", stamp, ranges.astype(np.float32), -1.2, 0.006, 0.1, 10.0, pose)
 
 
-def walk(speed=1.0, turned=0.0, count=40):
+def walk(speed=1.0, turned=0.0, count=40, radius=0.05):
     """Scans at 10 Hz of a chair and somebody who walks past it."""
     pose = np.eye(4)
     pose[2, 3] = 0.3
@@ -227,7 +227,7 @@ def walk(speed=1.0, turned=0.0, count=40):
         stamp = 0.1 * index
         middle = np.array([2.4, -2.0 + speed * stamp])
         stride = 0.25 * np.sin(2.0 * np.pi * stamp) * (speed > 0.0)
-        legs = [((middle[0] - s * 0.09, middle[1] + s * stride), 0.05) for s in (1.0, -1.0)]
+        legs = [((middle[0] - s * 0.09, middle[1] + s * stride), radius) for s in (1.0, -1.0)]
         here = pose.copy()
         here[:3, :3] = turn((0.0, 0.0, 1.0), turned * stamp)
         yield sweep(stamp, chair + legs, here), middle
@@ -251,6 +251,21 @@ def test_legs_that_walk_are_found_and_furniture_is_not():
     box = ((0.0, -5.0, 0.0), (5.0, 5.0, 1.0))
     assert not any(out.find(observed(scan, body=legs, stamp=scan.stamp, exclude=(box,))) for scan, _ in walk())
     assert not any(LegsStart().find(observed(scan, body=BODY, stamp=scan.stamp)) for scan, _ in walk())
+
+
+def test_a_laser_that_turns_clockwise_finds_the_same_legs():
+    """Of a child, whose shins are hardly wider than the least."""
+    scans = [scan for scan, _ in walk(radius=0.025)]
+    turned = [
+        replace(scan, ranges=scan.ranges[::-1], angle_min=float(ANGLES[-1]), angle_increment=-0.006) for scan in scans
+    ]
+    finders, body = (LegsStart(), LegsStart()), legs_body(1.2)
+    found = [
+        [finder.find(observed(scan, body=body, stamp=scan.stamp)) for scan in each]
+        for finder, each in zip(finders, (scans, turned), strict=True)
+    ]
+    assert sum(map(len, found[0])) >= 10
+    assert [len(one) for one in found[0]] == [len(one) for one in found[1]]
 
 
 def test_the_sizes_of_a_start_from_legs_are_those_of_the_body():

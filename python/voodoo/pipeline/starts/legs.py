@@ -169,7 +169,7 @@ def _leg_middles(scan: LaserScan, free: FreeSpace, exclude: Sequence[Box]) -> li
     cuts = np.flatnonzero(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1) > _GAP_M) + 1
     middles = []
     for part, new in zip(np.split(points, cuts), np.split(come, cuts), strict=True):
-        beam = scan.angle_increment * float(np.linalg.norm(part[0]))
+        beam = abs(scan.angle_increment) * float(np.linalg.norm(part[0]))
         width = float(np.linalg.norm(part[-1] - part[0])) + beam
         if len(part) >= 2 and _WIDTH_M[0] <= width <= _WIDTH_M[1] and new.mean() >= _COME:
             middle = part.mean(axis=0)
