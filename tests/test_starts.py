@@ -218,13 +218,13 @@ def sweep(stamp, circles, pose):
     return LaserScan("scan", stamp, ranges.astype(np.float32), -1.2, 0.006, 0.1, 10.0, pose)
 
 
-def walk(speed=1.0, turned=0.0, count=40, radius=0.05):
-    """Scans at 10 Hz of a chair and somebody who walks past it."""
+def walk(speed=1.0, turned=0.0, count=40, radius=0.05, rate=10.0):
+    """Scans of a chair and somebody who walks past it."""
     pose = np.eye(4)
     pose[2, 3] = 0.3
     chair = [((2.0, -0.9), 0.03), ((2.3, -0.9), 0.03), ((2.0, -1.2), 0.03), ((2.3, -1.2), 0.03)]
     for index in range(count):
-        stamp = 0.1 * index
+        stamp = index / rate
         middle = np.array([2.4, -2.0 + speed * stamp])
         stride = 0.25 * np.sin(2.0 * np.pi * stamp) * (speed > 0.0)
         legs = [((middle[0] - s * 0.09, middle[1] + s * stride), radius) for s in (1.0, -1.0)]
@@ -266,6 +266,19 @@ def test_a_laser_that_turns_clockwise_finds_the_same_legs():
     ]
     assert sum(map(len, found[0])) >= 10
     assert [len(one) for one in found[0]] == [len(one) for one in found[1]]
+
+
+def test_the_offset_of_two_lasers_is_no_motion():
+    """Who walks along y faces it, though the second laser measures everything 0.1 m nearer."""
+    finder, legs, left = LegsStart(), legs_body(), []
+    for index, (scan, _) in enumerate(walk(count=80, rate=20.0)):
+        pose = scan.root_from_sensor.copy()
+        pose[0, 3] -= 0.1 * (index % 2)
+        item = replace(scan, sensor=f"scan{index % 2}", root_from_sensor=pose)
+        for one in finder.find(observed(item, body=legs, stamp=scan.stamp)):
+            left.append(one.joints["l_hip"] - one.joints["r_hip"])
+    assert len(left) >= 10
+    assert all(across[0] < -2.0 * abs(across[1]) for across in left)
 
 
 def test_the_sizes_of_a_start_from_legs_are_those_of_the_body():

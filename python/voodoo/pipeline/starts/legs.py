@@ -60,7 +60,8 @@ class LegsStart(StartFinder):
     def __init__(self) -> None:
         """Start without scans."""
         self._free: dict[str, FreeSpace] = {}
-        self._last: tuple[float, list[FloatArray]] | None = None
+        # Of each laser: the offset of two of them is no motion.
+        self._last: dict[str, tuple[float, list[FloatArray]]] = {}
 
     def find(self, frame: StartFrame) -> Sequence[FoundStart]:
         """See StartFinder."""
@@ -76,7 +77,9 @@ class LegsStart(StartFinder):
 
     def _pair(self, scan: LaserScan, middles: list[FloatArray]) -> tuple[FloatArray, FloatArray] | None:
         """Two legs (2, 2) [m] that were also in the previous scan, and their motion since (2,); the nearest to the laser."""
-        before, self._last = self._last, (scan.stamp, middles) if len(middles) > 1 else self._last
+        before = self._last.get(scan.sensor)
+        if len(middles) > 1:
+            self._last[scan.sensor] = (scan.stamp, middles)
         if before is None or not 0.0 < scan.stamp - before[0] <= _PATIENCE_S:
             return None
         reach = _FASTEST * (scan.stamp - before[0])
