@@ -121,6 +121,15 @@ def test_one_of_two_people_and_not_a_mixture_of_both():
     assert min(worst(found, first), worst(found, second)) < 0.08
 
 
+def test_cameras_that_have_gone_do_not_count_among_those_that_see_a_person():
+    joints, finder = person(), CamerasStart()
+    there = images([joints], AROUND[:2])
+    gone = [replace(item, sensor=f"gone{number}", people=()) for number, item in enumerate(there)]
+    assert finder.find(observed(*there, *gone))[0].log_odds == 0.0
+    later = [replace(item, stamp=1.5) for item in there]
+    assert finder.find(observed(*later, stamp=1.5))[0].log_odds == np.inf
+
+
 def test_cameras_that_disagree_or_stand_together_find_nobody():
     joints = person()
     pair = images([joints], AROUND[:2])
