@@ -22,10 +22,13 @@ from voodoo.errors import VoodooError
 from voodoo.export.people import PeopleTrack
 from voodoo.export.track import Track
 from voodoo.live import FAULTS, Follower
+from voodoo.live.clock import HostClock
 from voodoo.live.session import Output, Session
+from voodoo.live.source import Faults
 from voodoo.live.sources.growing import GrowingSource
 from voodoo.live.sources.played import PlayedSource
 from voodoo.recordings import open_recording, sample_path
+from voodoo.recordings.left_out import LeftOut
 
 ROOT = Path(__file__).resolve().parent.parent
 FAST = ("--use", "depth")
@@ -123,6 +126,26 @@ def test_damage_in_a_recording_is_a_fault(tmp_path):
     assert report["faults"] == {"unreadable message": 1}
     assert report["received"] == 11
     assert "unreadable message" in result.output
+
+
+def test_what_a_recording_assumes_and_notes_is_reported_once(tmp_path):
+    frames = list(open_recording(sample_path(), use=("depth",)))[:3]
+    (tmp_path / "walk" / "depth").mkdir(parents=True)
+    (tmp_path / "walk" / "calibration.toml").write_text(calibration_of(depth_of(frames[0])))
+    for path, data, number in grown(tmp_path / "walk", frames):
+        path.with_stem(f"{number:05d}").write_bytes(data)
+    left_out, messages = LeftOut(), []
+    source = PlayedSource(
+        open_recording(tmp_path / "walk", left_out=left_out), rate=1000.0, loop=True, left_out=left_out
+    )
+    source.open(HostClock(), Faults(messages.append))
+    left_out.notes["the clock was set back"] = None
+    for _ in range(20):
+        source.read(0.1)
+    assert [words.partition(";")[0] for words in messages] == [
+        "depth/ is numbered, and taken for 30 images/s",
+        "walk: the clock was set back",
+    ]
 
 
 def test_several_people_have_ids(tmp_path):
