@@ -22,11 +22,15 @@ from voodoo.errors import VoodooError
 from voodoo.export.people import PeopleTrack
 from voodoo.export.track import Track
 from voodoo.live import FAULTS, Follower
+from voodoo.live.assembly import LiveFrame
 from voodoo.live.clock import HostClock
+from voodoo.live.follow import Step
+from voodoo.live.recorder import Recorder
 from voodoo.live.session import Output, Session
 from voodoo.live.source import Faults
 from voodoo.live.sources.growing import GrowingSource
 from voodoo.live.sources.played import PlayedSource
+from voodoo.measurements import LaserScan, MarkerSet
 from voodoo.recordings import open_recording, sample_path
 from voodoo.recordings.left_out import LeftOut
 
@@ -86,6 +90,20 @@ def test_what_was_recorded_is_tracked_again(run):
     assert {sensor.kind for sensor in recording.info().sensors} == {"depth", "scan", "color"}
     names = {topic.name for topic in recording._bag.topics}
     assert {"/tf", "/humans/bodies/p1/joint_states", "/humans/bodies/p1/markers"} <= names
+
+
+def test_measurements_of_classes_of_ones_own_are_recorded_as_what_they_are(tmp_path):
+    class Own(LaserScan):
+        """Adapters accept it."""
+
+    recorder = Recorder(tmp_path / "take.mcap", root_frame=lambda: "base_link")
+    own = Own("laser", 1.0, np.full(5, 2.0, np.float32), -0.2, 0.1, 0.1, 10.0, np.eye(4))
+    markers = MarkerSet("suit", 1.0, {})
+    frame = LiveFrame(1.0, (own, markers), number=0, taken=1.0, arrived=1.0, breaks=False)
+    recorder.publish(Step(frame, estimates={}, bodies={}, seconds=0.0))
+    recorder.close()
+    (frame,) = open_recording(tmp_path / "take.mcap")
+    assert [item.sensor for item in frame.measurements] == ["/laser/scan"]
 
 
 def test_it_reports_that_it_stores_pictures_of_people(run):
