@@ -140,6 +140,18 @@ def test_every_frame_alone_forgets_the_one_before(some):
     assert not np.allclose(alone.angles[6:], warm.angles[6:], atol=1e-6)
 
 
+def test_every_frame_alone_begins_at_the_first_pose_with_regions_too(some, monkeypatch):
+    begun = []
+
+    def noted(*args, start, **how):
+        begun.append(start)
+        return ik.solve(*args, start=start, **how)
+
+    monkeypatch.setattr("voodoo.pipeline.ik.solve", noted)
+    follow(Some(some, 3), start_tracker(some), known_positions(some), pictures="regions", warm=False)
+    assert len(begun) == 5 and all(start is begun[0] for start in begun)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

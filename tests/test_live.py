@@ -16,6 +16,7 @@ from voodoo.live import FAULTS, Faults, SourceEnded, SourceGone
 from voodoo.live.assembly import Assembler, HostTime, Stamps
 from voodoo.live.latencies import Latencies
 from voodoo.live.mailbox import Inbox, Mailbox
+from voodoo.live.stream import Live
 from voodoo.measurements import ColorImage, LaserScan
 
 
@@ -360,6 +361,26 @@ def test_the_first_of_several_sources_makes_the_frames():
     assert all(len([item for item in frame.measurements if item.sensor == "back"]) <= 1 for frame in frames)
     assert sum(len(frame.measurements) == 2 for frame in frames) >= 0.3 * len(frames)
     assert live.received <= 18
+
+
+@pytest.mark.parametrize("name", ["_left", "_delivered"])
+def test_sources_that_end_or_deliver_together_are_all_counted(name):
+    class Slow(Live):
+        """Every source reads the count before another one writes it."""
+
+    def slowly(live):
+        count = vars(live).get(name)
+        time.sleep(0.05)
+        return count
+
+    setattr(Slow, name, property(slowly, lambda live, count: vars(live).update({name: count})))
+    first, second = (Script(arrival_of(wall(1.0, sensor=sensor))) for sensor in ("front", "back"))
+    second.name = "by another hand"
+    with Slow([first, second]) as live:
+        until = time.monotonic() + 2.0
+        while live.status != "ended" and time.monotonic() < until:
+            live.next(0.01)
+        assert live.status == "ended" and live.received == 1
 
 
 @pytest.mark.parametrize(

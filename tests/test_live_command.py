@@ -22,10 +22,17 @@ from voodoo.errors import VoodooError
 from voodoo.export.people import PeopleTrack
 from voodoo.export.track import Track
 from voodoo.live import FAULTS, Follower
+from voodoo.live.assembly import LiveFrame
+from voodoo.live.clock import HostClock
+from voodoo.live.follow import Step
+from voodoo.live.recorder import Recorder
 from voodoo.live.session import Output, Session
+from voodoo.live.source import Faults
 from voodoo.live.sources.growing import GrowingSource
 from voodoo.live.sources.played import PlayedSource
+from voodoo.measurements import LaserScan, MarkerSet
 from voodoo.recordings import open_recording, sample_path
+from voodoo.recordings.left_out import LeftOut
 
 ROOT = Path(__file__).resolve().parent.parent
 FAST = ("--use", "depth")
@@ -85,6 +92,20 @@ def test_what_was_recorded_is_tracked_again(run):
     assert {"/tf", "/humans/bodies/p1/joint_states", "/humans/bodies/p1/markers"} <= names
 
 
+def test_measurements_of_classes_of_ones_own_are_recorded_as_what_they_are(tmp_path):
+    class Own(LaserScan):
+        """Adapters accept it."""
+
+    recorder = Recorder(tmp_path / "take.mcap", root_frame=lambda: "base_link")
+    own = Own("laser", 1.0, np.full(5, 2.0, np.float32), -0.2, 0.1, 0.1, 10.0, np.eye(4))
+    markers = MarkerSet("suit", 1.0, {})
+    frame = LiveFrame(1.0, (own, markers), number=0, taken=1.0, arrived=1.0, breaks=False)
+    recorder.publish(Step(frame, estimates={}, bodies={}, seconds=0.0))
+    recorder.close()
+    (frame,) = open_recording(tmp_path / "take.mcap")
+    assert [item.sensor for item in frame.measurements] == ["/laser/scan"]
+
+
 def test_it_reports_that_it_stores_pictures_of_people(run):
     assert "stores pictures of people" in run[1].output
 
@@ -123,6 +144,26 @@ def test_damage_in_a_recording_is_a_fault(tmp_path):
     assert report["faults"] == {"unreadable message": 1}
     assert report["received"] == 11
     assert "unreadable message" in result.output
+
+
+def test_what_a_recording_assumes_and_notes_is_reported_once(tmp_path):
+    frames = list(open_recording(sample_path(), use=("depth",)))[:3]
+    (tmp_path / "walk" / "depth").mkdir(parents=True)
+    (tmp_path / "walk" / "calibration.toml").write_text(calibration_of(depth_of(frames[0])))
+    for path, data, number in grown(tmp_path / "walk", frames):
+        path.with_stem(f"{number:05d}").write_bytes(data)
+    left_out, messages = LeftOut(), []
+    source = PlayedSource(
+        open_recording(tmp_path / "walk", left_out=left_out), rate=1000.0, loop=True, left_out=left_out
+    )
+    source.open(HostClock(), Faults(messages.append))
+    left_out.notes["the clock was set back"] = None
+    for _ in range(20):
+        source.read(0.1)
+    assert [words.partition(";")[0] for words in messages] == [
+        "depth/ is numbered, and taken for 30 images/s",
+        "walk: the clock was set back",
+    ]
 
 
 def test_several_people_have_ids(tmp_path):

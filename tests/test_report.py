@@ -1,12 +1,15 @@
 """The page of a result, looked at in Chromium: nothing fails, nothing is fetched, and play turns the skeleton."""
 
 import math
+import os
+import shutil
 from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
 
+import color_scene
 import voodoo
 from browser import needs_chromium, told_by
 from commands import refused, run
@@ -70,7 +73,7 @@ def test_the_film_goes_with_the_timeline_and_angles_have_deviations(tmp_path):
     assert width == cv2.VideoCapture(str(film)).get(cv2.CAP_PROP_FRAME_WIDTH) and console == []
     assert duration == pytest.approx(len(track) / 30.0, abs=0.2) and 0.1 < at <= duration
     assert bands == len(track.angle_names) and "Left out: nothing" in page
-    refused(run("report", result, "--film", result, "--out", tmp_path / "none.html"), "expected a film")
+    refused(run("report", result, "--film", result, "--out", tmp_path / "none.html"), "expected a video")
 
 
 def test_what_is_no_result_leaves_no_page(tmp_path):
@@ -79,3 +82,20 @@ def test_what_is_no_result_leaves_no_page(tmp_path):
     refused(run("report", tmp_path / "none.npz", "--out", tmp_path / "a.html"), "none.npz", "no such file")
     refused(run("report", tmp_path / "pose.csv", "--out", tmp_path / "a.pdf"), "a.pdf", ".html")
     assert [path.name for path in tmp_path.iterdir()] == ["pose.csv"]
+
+
+def test_a_film_that_opencv_cannot_read_or_write_is_an_error_that_names_it(tmp_path, monkeypatch):
+    result, film = tmp_path / "pose.npz", tmp_path / os.fsdecode(b"a\xff.avi")
+    track_of(voodoo.Body.human()).save(result)
+    color_scene.write_video(tmp_path / "look.avi", [np.zeros((48, 64, 3), np.uint8)] * 3)
+    shutil.copy(tmp_path / "look.avi", film)
+    refused(run("report", result, "--film", film, "--out", tmp_path / "a.html"), "expected a name in UTF-8")
+
+    class Closed:
+        fourcc = staticmethod(lambda *_: 0)
+
+        def __init__(self, *_):
+            self.isOpened = self.write = self.release = lambda *_: False
+
+    monkeypatch.setattr("cv2.VideoWriter", Closed)
+    refused(run("report", result, "--film", tmp_path / "look.avi", "--out", tmp_path / "a.html"), "look.avi", "VP8")

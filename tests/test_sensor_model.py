@@ -1,9 +1,12 @@
 """Weights from standard deviations, and gates around predictions."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from voodoo import Camera, MeasurementError
+from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.model import (
     PAPER_WEIGHTS,
@@ -15,6 +18,7 @@ from voodoo.sensors.model import (
     stereo_noise,
 )
 from voodoo.sensors.pixels import ray_distance, world_rays
+from voodoo.sensors.skin.settings import SkinSettings
 
 LENS = Camera(640, 480, 500.0, 510.0, 320.5, 239.0, (-0.2, 0.05, 1e-3, -2e-3, 0.0))
 FISHEYE = Camera(640, 480, 300.0, 300.0, 320.0, 240.0, (0.05, -0.01, 0.002, 0.0), "equidistant")
@@ -67,6 +71,23 @@ def test_noise_refuses_nonsense():
         stereo_noise(focal=400.0, baseline=0.0)
     with pytest.raises(MeasurementError, match="depth"):
         PixelNoise().sigma(0.0, 500.0)
+
+
+@pytest.mark.parametrize(
+    ("make", "name"),
+    [
+        (SensorModel, "reference_sigma"),
+        (RangeNoise, "constant"),
+        (PixelNoise, "spread"),
+        (partial(stereo_noise, focal=400.0), "baseline"),
+        (DepthFilter, "nearest"),
+        (SkinSettings, "gate"),
+    ],
+)
+@pytest.mark.parametrize("value", ["x", None, [1.0, 2.0]])
+def test_what_is_no_number_is_refused_by_name(make, name, value):
+    with pytest.raises(MeasurementError, match=f"{name}: expected a .*number.*, found"):
+        make(**{name: value})
 
 
 @pytest.mark.parametrize("camera", [LENS, FISHEYE])

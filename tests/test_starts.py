@@ -121,6 +121,15 @@ def test_one_of_two_people_and_not_a_mixture_of_both():
     assert min(worst(found, first), worst(found, second)) < 0.08
 
 
+def test_cameras_that_have_gone_do_not_count_among_those_that_see_a_person():
+    joints, finder = person(), CamerasStart()
+    there = images([joints], AROUND[:2])
+    gone = [replace(item, sensor=f"gone{number}", people=()) for number, item in enumerate(there)]
+    assert finder.find(observed(*there, *gone))[0].log_odds == 0.0
+    later = [replace(item, stamp=1.5) for item in there]
+    assert finder.find(observed(*later, stamp=1.5))[0].log_odds == np.inf
+
+
 def test_cameras_that_disagree_or_stand_together_find_nobody():
     joints = person()
     pair = images([joints], AROUND[:2])
@@ -218,16 +227,16 @@ def sweep(stamp, circles, pose):
     return LaserScan("scan", stamp, ranges.astype(np.float32), -1.2, 0.006, 0.1, 10.0, pose)
 
 
-def walk(speed=1.0, turned=0.0, count=40):
-    """Scans at 10 Hz of a chair and somebody who walks past it."""
+def walk(speed=1.0, turned=0.0, count=40, radius=0.05, rate=10.0):
+    """Scans of a chair and somebody who walks past it."""
     pose = np.eye(4)
     pose[2, 3] = 0.3
     chair = [((2.0, -0.9), 0.03), ((2.3, -0.9), 0.03), ((2.0, -1.2), 0.03), ((2.3, -1.2), 0.03)]
     for index in range(count):
-        stamp = 0.1 * index
+        stamp = index / rate
         middle = np.array([2.4, -2.0 + speed * stamp])
         stride = 0.25 * np.sin(2.0 * np.pi * stamp) * (speed > 0.0)
-        legs = [((middle[0] - s * 0.09, middle[1] + s * stride), 0.05) for s in (1.0, -1.0)]
+        legs = [((middle[0] - s * 0.09, middle[1] + s * stride), radius) for s in (1.0, -1.0)]
         here = pose.copy()
         here[:3, :3] = turn((0.0, 0.0, 1.0), turned * stamp)
         yield sweep(stamp, chair + legs, here), middle
@@ -251,6 +260,47 @@ def test_legs_that_walk_are_found_and_furniture_is_not():
     box = ((0.0, -5.0, 0.0), (5.0, 5.0, 1.0))
     assert not any(out.find(observed(scan, body=legs, stamp=scan.stamp, exclude=(box,))) for scan, _ in walk())
     assert not any(LegsStart().find(observed(scan, body=BODY, stamp=scan.stamp)) for scan, _ in walk())
+
+
+def test_a_laser_that_turns_clockwise_finds_the_same_legs():
+    """Of a child, whose shins are hardly wider than the least."""
+    scans = [scan for scan, _ in walk(radius=0.025)]
+    turned = [
+        replace(scan, ranges=scan.ranges[::-1], angle_min=float(ANGLES[-1]), angle_increment=-0.006) for scan in scans
+    ]
+    finders, body = (LegsStart(), LegsStart()), legs_body(1.2)
+    found = [
+        [finder.find(observed(scan, body=body, stamp=scan.stamp)) for scan in each]
+        for finder, each in zip(finders, (scans, turned), strict=True)
+    ]
+    assert sum(map(len, found[0])) >= 10
+    assert [len(one) for one in found[0]] == [len(one) for one in found[1]]
+
+
+def test_the_offset_of_two_lasers_is_no_motion():
+    """Who walks along y faces it, though the second laser measures everything 0.1 m nearer."""
+    finder, legs, left = LegsStart(), legs_body(), []
+    for index, (scan, _) in enumerate(walk(count=80, rate=20.0)):
+        pose = scan.root_from_sensor.copy()
+        pose[0, 3] -= 0.1 * (index % 2)
+        item = replace(scan, sensor=f"scan{index % 2}", root_from_sensor=pose)
+        for one in finder.find(observed(item, body=legs, stamp=scan.stamp)):
+            left.append(one.joints["l_hip"] - one.joints["r_hip"])
+    assert len(left) >= 10
+    assert all(across[0] < -2.0 * abs(across[1]) for across in left)
+
+
+def test_the_sizes_of_a_start_from_legs_are_those_of_the_body():
+    """A child stays one: the start also scales the body."""
+    tracker = voodoo.Tracker(legs_body(1.2))
+    front_end = FrontEnd(tracker)
+    for scan, _ in walk():
+        front_end.step(RecordedFrame(scan.stamp, (scan,)))
+        if front_end.posed:
+            break
+    assert front_end.found.by == LegsStart.name
+    lengths = [limb.shape.length for limb in tracker.body.limbs if limb.name != "pelvis"]
+    assert lengths == pytest.approx([0.491 * 1.2] * 2, rel=0.02)
 
 
 def frames(*measurements, count, rate=30.0):

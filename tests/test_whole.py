@@ -120,14 +120,19 @@ def test_a_figure_and_a_picture_appear_whole(tmp_path, monkeypatch):
     assert figure.read_text() == picture.read_text() == "old"
 
 
-def test_the_files_of_persons_are_outputs_too(tmp_path):
-    check_outputs([tmp_path / "walk.trc"], [], numbered=True)
-    (tmp_path / "walk_1.trc").write_text("markers")
-    check_outputs([tmp_path / "walk.trc"], [tmp_path / "walk_1.trc"])
+@pytest.mark.parametrize("suffix", ONE_PERSON)
+def test_the_files_of_persons_are_outputs_too(tmp_path, suffix):
+    walk, first = tmp_path / f"walk{suffix}", tmp_path / f"walk_1{suffix}"
+    check_outputs([walk], [], numbered=ONE_PERSON)
+    first.write_text("markers")
+    check_outputs([walk], [first])
     with pytest.raises(voodoo.VoodooError, match="can be a person's"):
-        check_outputs([tmp_path / "walk.trc"], [tmp_path / "walk_1.trc"], numbered=True)
+        check_outputs([walk], [first], numbered=ONE_PERSON)
     with pytest.raises(voodoo.VoodooError, match="apart"):
-        check_outputs([tmp_path / "look.bvh", tmp_path / "look_12.bvh"], [], numbered=True)
+        check_outputs([tmp_path / "look.bvh", tmp_path / "look_12.bvh"], [], numbered=ONE_PERSON)
+    track = ["track", sample_path(), "--people", "any", "--with", first, "--out", walk]
+    refused(run(app, [str(word) for word in track]), "can be a person's")
+    assert first.read_text() == "markers"
 
 
 def test_two_processes_that_write_one_name_leave_one_whole_result(tmp_path):

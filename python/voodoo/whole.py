@@ -8,7 +8,7 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -214,13 +214,13 @@ def _sync(path: Path) -> None:
         os.close(descriptor)
 
 
-def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path | None], *, numbered: bool = False) -> None:
+def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path | None], *, numbered: Container[str] = ()) -> None:
     """Reject outputs that would replace what is read, or each other, before the work starts.
 
     Args:
         outputs: files and folders that will be written.
         inputs: files and folders that are read; None and names that are no files are ignored.
-        numbered: outputs of one person, .bvh and .trc, become NAME_1, NAME_2, ...
+        numbered: suffixes of outputs that become NAME_1, NAME_2, ..., one of each person.
 
     Raises:
         VoodooError: an output is an input or inside one, or two outputs are the same or one is inside the other.
@@ -231,7 +231,7 @@ def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path | None], *, num
         for source, found in sources:
             if _same(place, found):
                 raise VoodooError(f"{path}: expected another file than what is read, found the same")
-            if numbered and _is_numbered(found, place):
+            if place.suffix in numbered and _is_numbered(found, place):
                 raise VoodooError(
                     f"{path}: expected other files than what is read, found that {source} can be a person's"
                 )
@@ -240,7 +240,7 @@ def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path | None], *, num
             if place in found.parents:
                 raise VoodooError(f"{path}: expected a place outside of what is read, found a folder with {source}")
         for other, found in targets[:index]:
-            both = numbered and (_is_numbered(found, place) or _is_numbered(place, found))
+            both = place.suffix in numbered and (_is_numbered(found, place) or _is_numbered(place, found))
             if _same(place, found) or found in place.parents or place in found.parents or both:
                 raise VoodooError(f"{path}: expected outputs that are apart, found {other} in the same place")
 
@@ -253,7 +253,7 @@ def _place(path: Path) -> Path:
 def _is_numbered(path: Path, target: Path) -> bool:
     """Whether a file can be that of a person of an output."""
     stem = re.fullmatch(rf"{re.escape(target.stem)}_\d+", path.stem)
-    return stem is not None and path.parent == target.parent and path.suffix == target.suffix in (".bvh", ".trc")
+    return stem is not None and path.parent == target.parent and path.suffix == target.suffix
 
 
 def _same(one: Path, other: Path) -> bool:

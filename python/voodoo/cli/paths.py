@@ -43,6 +43,7 @@ def check_paths(context: typer.Context, default: Sequence[Path] = ()) -> None:
     Raises:
         VoodooError: see `voodoo.whole.check_outputs`.
     """
+    from voodoo.export.files import ONE_PERSON
     from voodoo.whole import check_outputs
 
     outputs, inputs = list(default), []
@@ -57,4 +58,5 @@ def check_paths(context: typer.Context, default: Sequence[Path] = ()) -> None:
                 inputs += [Path(part) for word in words for part in (word, *re.split("[=:]", word, maxsplit=1)[1:])]
     folders = {folder for path in inputs for folder in (path.parent, path.parent.parent)}
     inputs += [folder / name for folder in sorted(folders) for name in _BESIDE]
-    check_outputs(outputs, inputs, numbered=context.params.get("people") not in (None, "1"))
+    several = context.params.get("people") not in (None, "1")
+    check_outputs(outputs, inputs, numbered=ONE_PERSON if several else ())

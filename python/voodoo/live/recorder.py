@@ -80,7 +80,7 @@ class Recorder(Output):
     def _write_item(self, item: Measurement) -> None:
         if not isinstance(item, DepthImage | ColorImage | PointCloud | LaserScan):
             return
-        topic, made = _WRITTEN[type(item)]
+        topic, made = next(one for kind, one in _WRITTEN.items() if isinstance(item, kind))
         name = entity(item.sensor)
         frame = f"{name}_frame"
         self._write("/tf", transforms(self._root(), frame, item.stamp, item.root_from_sensor))

@@ -66,6 +66,8 @@ class Live:
         self._frames: Mailbox[LiveFrame] = Mailbox()
         self._stop = threading.Event()
         self._threads: list[threading.Thread] = []
+        # Each source has a thread.
+        self._lock = threading.Lock()
         self._left = len(self.sources)
         self._error: BaseException | None = None
         self._good: float | None = None
@@ -248,9 +250,10 @@ class Live:
                 is_open = False
                 source.close()
                 self._stop.wait(_REOPEN_S)
-        self._left -= 1
-        if not self._left:
-            self._inbox.close()
+        with self._lock:
+            self._left -= 1
+            if not self._left:
+                self._inbox.close()
 
     def _decode(self) -> None:
         """Make frames from arrivals."""
@@ -261,7 +264,8 @@ class Live:
 
     def deliver(self, arrival: Arrival) -> None:
         """Add new arrivals from a source."""
-        self._delivered += arrival.drives
+        with self._lock:
+            self._delivered += arrival.drives
         self._inbox.put((arrival, self.clock.now()))
 
     def turn(self, timeout: float) -> None:

@@ -24,16 +24,20 @@ def limbs_at_rest(body: Body) -> tuple[FloatArray, FloatArray]:
     return turns, origins
 
 
-@lru_cache(maxsize=1)
-def _human() -> Mapping[str, FloatArray]:
-    """Sites (3,) [m] of the default human."""
-    body = Body.human(model="full")
+def sites_at_rest(body: Body) -> dict[str, FloatArray]:
+    """Positions (3,) [m] of the sites."""
     turns, origins = limbs_at_rest(body)
     places = {}
     for site, limb, place in body.core.parts()[2]:
         index = body.limb_names.index(limb)
         places[site] = turns[index] @ np.asarray(place) + origins[index]
     return places
+
+
+@lru_cache(maxsize=1)
+def _human() -> Mapping[str, FloatArray]:
+    """Sites (3,) [m] of the default human."""
+    return sites_at_rest(Body.human(model="full"))
 
 
 @lru_cache

@@ -140,7 +140,7 @@ def follow(
                 posture = follower.step(targets, images=images)
             else:
                 posture = solve(chain, targets, images=images, start=start, options=options)
-            last, near = posture.joints, posture
+            last, near = posture.joints, posture if warm else start
             first, any_images = False, any_images or posture.images > 0
             if regions is not None and targets:
                 regions.learn(colors, posture.world_from_limb)

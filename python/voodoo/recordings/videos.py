@@ -88,7 +88,7 @@ def of_video(path: Path, sensor: str, placed: PlacedCamera, rate: float | None) 
     Raises:
         RecordingError: not a video, or of another size than calibrated.
     """
-    film = _opened(path)
+    film = opened_video(path)
     count = int(film.get(cv2.CAP_PROP_FRAME_COUNT))
     size = (int(film.get(cv2.CAP_PROP_FRAME_WIDTH)), int(film.get(cv2.CAP_PROP_FRAME_HEIGHT)))
     rate = float(film.get(cv2.CAP_PROP_FPS)) if rate is None else rate
@@ -128,7 +128,12 @@ def pictures_in(folder: Path) -> list[Path]:
     return in_order([item for item in folder.iterdir() if item.suffix.lower() in PICTURES])
 
 
-def _opened(path: Path) -> cv2.VideoCapture:
+def opened_video(path: Path) -> cv2.VideoCapture:
+    """A video file, opened at its first image.
+
+    Raises:
+        RecordingError: no regular file, a name that is not UTF-8, or no video that FFmpeg reads.
+    """
     check_stored(path, "a video", most=MOST_RECORDED)
     film = cv2.VideoCapture(utf8_name(path.absolute(), error=RecordingError), cv2.CAP_FFMPEG)  # no URL
     if not film.isOpened():
@@ -148,7 +153,7 @@ class _VideoReader:
         """An image (H, W, 3) BGR uint8 by its number."""
         with reading(self._path, "a readable video"):
             if self._film is None or index < self._next:
-                self._film, self._next = _opened(self._path), 0
+                self._film, self._next = opened_video(self._path), 0
             while self._next < index and self._film.grab():
                 self._next += 1
             read, image = self._film.read() if self._next == index else (False, None)

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
 from voodoo.measurements import DepthArray, DepthImage, FloatArray
+from voodoo.model.joint import number_of
 from voodoo.model.projection import transform
 from voodoo.sensors.pixels import in_sensor
 
@@ -42,6 +43,8 @@ class DepthFilter:
 
     def __post_init__(self) -> None:
         """Check the limits."""
+        for name in ("edge", "slant", "nearest", "farthest"):
+            number_of(f"depth filter {name}", getattr(self, name), "a number of meters", error=MeasurementError)
         if not (0.0 <= self.nearest < self.farthest and self.edge > 0.0 and self.slant >= 2.0 * self.edge):
             raise MeasurementError(
                 "depth filter: expected 0 <= nearest < farthest and 0 < 2 edge <= slant, found nearest "

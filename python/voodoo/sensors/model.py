@@ -24,6 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
+from voodoo.model.joint import number_of
 
 N = TypeVar("N", float, npt.NDArray[np.float64])
 PAPER_WEIGHTS: dict[str, float] = {"point": 1.0, "face": 30.0, "hand": 20.0}
@@ -37,9 +38,11 @@ TYPICAL_RANGE_M = 3.0
 
 
 def check_number(name: str, value: float, *, zero: bool = True) -> None:
-    """Raise an error for a number that is not finite, negative, or zero if that is not allowed."""
-    if not math.isfinite(value) or value < 0.0 or (value == 0.0 and not zero):
-        raise MeasurementError(f"{name}: expected a finite number {'>=' if zero else '>'} 0, found {value!r}")
+    """Raise an error for what is no number, not finite, negative, or zero if that is not allowed."""
+    expected = f"a finite number {'>=' if zero else '>'} 0"
+    number = number_of(name, value, expected, error=MeasurementError)
+    if not math.isfinite(number) or number < 0.0 or (number == 0.0 and not zero):
+        raise MeasurementError(f"{name}: expected {expected}, found {value!r}")
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from voodoo.export.skeleton import mean_interval
 from voodoo.export.table import FloatArray
 from voodoo.export.track import Track
 from voodoo.measurements import ASSUMED_RATE_HZ
+from voodoo.recordings.videos import opened_video
 
 _LINES = (
     ("humanoid_root", "vc7", "skullbase", "head_center", "skull_tip"),
@@ -70,9 +71,9 @@ def playable(film: Path) -> bytes:
     """A film as a WebM, which browsers play.
 
     Raises:
-        VoodooError: it cannot be read.
+        VoodooError: it cannot be read, or OpenCV cannot write a WebM.
     """
-    source = cv2.VideoCapture(str(film))
+    source = opened_video(film)
     readable, picture = source.read()
     if not readable:
         raise VoodooError(f"{film}: expected a film, found none that can be read")
@@ -80,6 +81,8 @@ def playable(film: Path) -> bytes:
         place = Path(folder) / "film.webm"
         rate, size = source.get(cv2.CAP_PROP_FPS) or ASSUMED_RATE_HZ, picture.shape[1::-1]
         writer = cv2.VideoWriter(str(place), cv2.VideoWriter.fourcc(*"VP80"), rate, size)
+        if not writer.isOpened():
+            raise VoodooError(f"{film}: expected an OpenCV that writes it as VP8 for browsers, found one that cannot")
         while readable:
             writer.write(picture)
             readable, picture = source.read()

@@ -36,6 +36,7 @@ class PlayedSource(Source):
         self.name, self.recording, self.root_frame = recording.name, recording, recording.root_frame
         self._rate, self._loop = rate, loop
         self._left_out = LeftOut() if left_out is None else left_out
+        self._told: set[str] = set()
         self._about = recording.info()
         self._driver = self._about.sensors[0].name if self._about.sensors else ""
 
@@ -72,12 +73,16 @@ class PlayedSource(Source):
             self._shift += frame.stamp - self._first + period
 
     def _following(self) -> RecordedFrame | None:
-        """The next frame; reports what was left out before it."""
+        """The next frame; reports what was left out before it, and once what is assumed and noted."""
         following = next(self._frames, None)
         for reason, count in self._left_out.counts.items():
             kind = kind_of(reason, "unreadable message")
             self._faults.add(kind, self._left_out.first[reason], self._clock.now(), count)
         self._left_out.counts.clear()
+        for words in (*self.recording.assumed, *(f"{self.name}: {note}" for note in self._left_out.notes)):
+            if words not in self._told:
+                self._told.add(words)
+                self._faults.log(words)
         return following
 
     def _arrivals(self, frame: RecordedFrame, due: float) -> list[Arrival]:

@@ -22,6 +22,8 @@ _BASELINE_M = 0.1
 _SAME_PERSON_M = 0.15
 """Largest median distance of a person's rays in one camera from the triangulated positions: half the distance to a neighbor."""
 _WORST_SIGMA_M = 0.10
+_GONE_S = 1.0
+"""A camera without an image for this time has gone: it does not count among those that could see a person."""
 
 
 _Person: TypeAlias = dict[str, SiteRay]
@@ -48,6 +50,7 @@ class CamerasStart(StartFinder):
         for item in frame.measurements:
             if isinstance(item, KeypointImage):
                 self._latest[item.sensor] = item
+        self._latest = {name: item for name, item in self._latest.items() if abs(frame.stamp - item.stamp) <= _GONE_S}
         images = [item for item in self._latest.values() if abs(frame.stamp - item.stamp) <= base.TOGETHER_S]
         views = [[person for rows in item.people if (person := _person(item, rows, frame))] for item in images]
         found = []

@@ -15,7 +15,7 @@ import voodoo._core as _core
 from voodoo._core import TaperedEllipticCylinder
 from voodoo.errors import BodyError, naming
 from voodoo.measurements import FloatArray, LaserScan
-from voodoo.model.at_rest import proportion
+from voodoo.model.at_rest import proportion, sites_at_rest
 from voodoo.model.body import STATURE_M, Body, Joint, Place
 from voodoo.model.projection import transform
 from voodoo.pipeline.starts.base import FoundStart, StartFinder, StartFrame
@@ -60,7 +60,8 @@ class LegsStart(StartFinder):
     def __init__(self) -> None:
         """Start without scans."""
         self._free: dict[str, FreeSpace] = {}
-        self._last: tuple[float, list[FloatArray]] | None = None
+        # Of each laser: the offset of two of them is no motion.
+        self._last: dict[str, tuple[float, list[FloatArray]]] = {}
 
     def find(self, frame: StartFrame) -> Sequence[FoundStart]:
         """See StartFinder."""
@@ -76,7 +77,9 @@ class LegsStart(StartFinder):
 
     def _pair(self, scan: LaserScan, middles: list[FloatArray]) -> tuple[FloatArray, FloatArray] | None:
         """Two legs (2, 2) [m] that were also in the previous scan, and their motion since (2,); the nearest to the laser."""
-        before, self._last = self._last, (scan.stamp, middles) if len(middles) > 1 else self._last
+        before = self._last.get(scan.sensor)
+        if len(middles) > 1:
+            self._last[scan.sensor] = (scan.stamp, middles)
         if before is None or not 0.0 < scan.stamp - before[0] <= _PATIENCE_S:
             return None
         reach = _FASTEST * (scan.stamp - before[0])
@@ -169,7 +172,7 @@ def _leg_middles(scan: LaserScan, free: FreeSpace, exclude: Sequence[Box]) -> li
     cuts = np.flatnonzero(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1) > _GAP_M) + 1
     middles = []
     for part, new in zip(np.split(points, cuts), np.split(come, cuts), strict=True):
-        beam = scan.angle_increment * float(np.linalg.norm(part[0]))
+        beam = abs(scan.angle_increment) * float(np.linalg.norm(part[0]))
         width = float(np.linalg.norm(part[-1] - part[0])) + beam
         if len(part) >= 2 and _WIDTH_M[0] <= width <= _WIDTH_M[1] and new.mean() >= _COME:
             middle = part.mean(axis=0)
@@ -190,12 +193,15 @@ def _found(legs: FloatArray, moved: FloatArray, scan: LaserScan, frame: StartFra
     height = float(scan.root_from_sensor[2, 3])
     ground = frame.settings.ground_z
     floor = height - _SHIN_HEIGHT_M if ground is None else ground
+    # The start also sets the body's sizes: they stay those of the stature that is known.
+    at_rest = sites_at_rest(frame.body)
+    stature = float(np.linalg.norm(at_rest["l_ankle"] - at_rest["l_hip"])) / _leg()
     joints: dict[str, FloatArray] = {}
     for side, sign, leg in zip("lr", (1.0, -1.0), sorted(legs, key=lambda leg: -float(leg @ left)), strict=True):
-        hip = np.array([*(middle + sign * _half_width() * STATURE_M * left), floor + _HIP * STATURE_M])
+        hip = np.array([*(middle + sign * _half_width() * stature * left), floor + _HIP * stature])
         shin = np.array([*leg, height])
         joints[f"{side}_hip"] = hip
-        joints[f"{side}_ankle"] = hip + (shin - hip) / np.linalg.norm(shin - hip) * _leg() * STATURE_M
+        joints[f"{side}_ankle"] = hip + (shin - hip) / np.linalg.norm(shin - hip) * _leg() * stature
     return FoundStart(joints, dict.fromkeys(joints, _SIGMA_M), LegsStart.name)
 
 

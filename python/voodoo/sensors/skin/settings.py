@@ -44,7 +44,7 @@ class SkinSettings:
     def __post_init__(self) -> None:
         """Check the numbers."""
         names = ("gate", "gate_growth", "lost_gate", "widest_gate", "learn_every")
-        numbers = {name: float(getattr(self, name)) for name in names} | dict(self.sites)
+        numbers = {name: getattr(self, name) for name in names} | dict(self.sites)
         numbers |= {f"visible_bias {site}": bias for site, bias in self.visible_bias.items()}
         for name, value in numbers.items():
             check_number(f"skin {name}", value, zero=False)
