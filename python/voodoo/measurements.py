@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.model.camera import Camera
+from voodoo.model.joint import FloatArray as FloatArray
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 ByteImage: TypeAlias = npt.NDArray[np.uint8]
 DepthArray: TypeAlias = npt.NDArray[np.uint16] | npt.NDArray[np.float32]
 ASSUMED_RATE_HZ = 30.0

@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 Picture: TypeAlias = npt.NDArray[np.uint8]
 """(H, W, 3) BGR."""
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 Color: TypeAlias = tuple[int, int, int]
 """BGR."""
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from voodoo._core import Estimate
 from voodoo.evaluation import metrics
-from voodoo.evaluation.metrics import BoolArray, FloatArray, mean_or_nan
+from voodoo.evaluation.metrics import BoolArray, mean_or_nan
+from voodoo.measurements import FloatArray
 
 DROPPED = 0.2
 """Fraction of the joints that are dropped for the sparsification: the most uncertain ones, or the worst."""

@@ -24,12 +24,12 @@ from voodoo.errors import RecordingError, VoodooError
 from voodoo.evaluation import metrics
 from voodoo.evaluation.calibration import Deviations, sigma_of
 from voodoo.evaluation.depth_agreement import WITHIN_M, Selection, witness
-from voodoo.evaluation.metrics import BoolArray, FloatArray
+from voodoo.evaluation.metrics import BoolArray
 from voodoo.evaluation.people import PeopleScore
 from voodoo.evaluation.people_evaluate import evaluate_people, has_people
 from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M, FrameTable, Score
 from voodoo.export.track import Track
-from voodoo.measurements import ASSUMED_RATE_HZ
+from voodoo.measurements import ASSUMED_RATE_HZ, FloatArray
 from voodoo.names import SEARCHING, Automatic, HumanModel
 from voodoo.pipeline.inputs import pictures_alone
 from voodoo.pipeline.run import track

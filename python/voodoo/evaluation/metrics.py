@@ -11,10 +11,9 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.measurements import ROUNDED_S
+from voodoo.measurements import ROUNDED_S, FloatArray
 from voodoo.recordings.keypoint_layouts import LIMBS
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 
 LIMB_JOINTS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")

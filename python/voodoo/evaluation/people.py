@@ -19,8 +19,8 @@ import numpy.typing as npt
 import voodoo._core as _core
 from voodoo.errors import VoodooError, installed
 from voodoo.evaluation import metrics
-from voodoo.evaluation.metrics import FloatArray
 from voodoo.export.table import Arrays
+from voodoo.measurements import FloatArray
 from voodoo.recordings.people_truth import PeopleTruth
 
 MATCH_M = 0.5

@@ -26,11 +26,11 @@ from voodoo.errors import VoodooError
 from voodoo.export.conventions import JOINT_COLOR, JOINT_M, Color, limb_color
 from voodoo.export.human_frames import placed_names
 from voodoo.export.layout import rows_of
-from voodoo.export.skeleton import FloatArray, ellipsoids
+from voodoo.export.skeleton import ellipsoids
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, by_axes, upright
 from voodoo.export.urdf import urdf
-from voodoo.measurements import ColorImage, DepthImage
+from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.model.body import Body
 from voodoo.model.projection import CameraView
 from voodoo.model.rotations import quaternions

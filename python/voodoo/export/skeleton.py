@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -17,12 +16,11 @@ import numpy.typing as npt
 import voodoo._core as _core
 from voodoo.errors import VoodooError
 from voodoo.export.track import Track
-from voodoo.measurements import ASSUMED_RATE_HZ
+from voodoo.measurements import ASSUMED_RATE_HZ, FloatArray
 from voodoo.model.at_rest import limbs_at_rest
 from voodoo.model.body import Body
 from voodoo.model.rotations import quaternions
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 _MOVES_M = 1e-4
 
 

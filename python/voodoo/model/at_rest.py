@@ -7,11 +7,9 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from voodoo.model.body import STATURE_M, Body
-
-FloatArray = npt.NDArray[np.float64]
+from voodoo.model.joint import FloatArray
 
 
 def limbs_at_rest(body: Body) -> tuple[FloatArray, FloatArray]:

@@ -12,8 +12,8 @@ import numpy.typing as npt
 from voodoo._core import Estimate, TaperedEllipticCylinder
 from voodoo.model.body import Body
 from voodoo.model.camera import Camera
+from voodoo.model.joint import FloatArray
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 Axes: TypeAlias = Literal["rep103", "optical"]
 
 NEAREST_M = 0.05

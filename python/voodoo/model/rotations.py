@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 import voodoo._core as _core
-
-FloatArray = npt.NDArray[np.float64]
+from voodoo.model.joint import FloatArray
 
 
 def axes(words: str) -> FloatArray:

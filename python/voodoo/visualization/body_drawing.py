@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 
 from voodoo._core import Estimate, TaperedEllipticCylinder
-from voodoo.drawing.ink import INK, PAPER, SUBPIXEL, Color, FloatArray, Picture, fixed, person_color, point, side_color
+from voodoo.drawing.ink import INK, PAPER, SUBPIXEL, Color, Picture, fixed, person_color, point, side_color
+from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
 from voodoo.model.projection import View, limb_mesh, limb_silhouette, transform
 from voodoo.people import PeopleEstimate, Person
