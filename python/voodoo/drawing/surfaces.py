@@ -220,14 +220,14 @@ class Log:
 
     def silhouettes(self, path: str, item: Pictured) -> None:
         """Log the silhouettes of the limbs in the camera's image at a path."""
-        silhouettes, colors = [], []
+        silhouettes, colors, of_limb = [], [], limb_colors(self.body)
+        view = CameraView(item.camera, item.root_from_sensor)
         for limb in self.body.limbs if self.estimate.joints else ():
-            view = CameraView(item.camera, item.root_from_sensor)
             contour = limb_silhouette(limb.shape, self.estimate.world_from_limb[limb.name], view)
             if contour is not None:
                 corners = cv2.approxPolyDP(contour, _SILHOUETTE_PX, closed=True).reshape(-1, 2)
                 silhouettes.append(np.vstack([corners, corners[:1]]) + 0.5)
-                colors.append(limb_colors(self.body)[limb.name])
+                colors.append(of_limb[limb.name])
         self.send(f"{path}/picture/model", self.rr.LineStrips2D(silhouettes, radii=0.5, colors=colors))
 
     def depth(self, path: str, image: npt.NDArray[Any], meters_per_unit: float) -> None:
