@@ -21,7 +21,8 @@ from voodoo.model.at_rest import limbs_at_rest
 from voodoo.model.body import Body
 from voodoo.model.rotations import quaternions
 
-_MOVES_M = 1e-4
+SAME_M = 1e-4
+"""Lengths that differ by less are the same: numbers of files have this precision."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +175,7 @@ def placed_on_parents(
     places = posed.offsets()
     known = places[found] if found.any() else places
     still = np.median(known, axis=0)
-    moving = np.abs(known - still).max(axis=(0, 2)) > _MOVES_M
+    moving = np.abs(known - still).max(axis=(0, 2)) > SAME_M
     places[:, 0], moving[0] = posed.heads[:, 0], True
     return places, still, moving
 

@@ -22,16 +22,18 @@ def limbs_at_rest(body: Body) -> tuple[FloatArray, FloatArray]:
     return turns, origins
 
 
+def sites_at_rest(body: Body) -> dict[str, FloatArray]:
+    """Positions (3,) [m] of the sites."""
+    turns, origins = limbs_at_rest(body)
+    numbers = {limb: index for index, limb in enumerate(body.limb_names)}
+    sites = body.core.parts()[2]
+    return {site: turns[numbers[limb]] @ np.asarray(place) + origins[numbers[limb]] for site, limb, place in sites}
+
+
 @lru_cache(maxsize=1)
 def _human() -> Mapping[str, FloatArray]:
-    """Sites (3,) [m] of the default human."""
-    body = Body.human(model="full")
-    turns, origins = limbs_at_rest(body)
-    places = {}
-    for site, limb, place in body.core.parts()[2]:
-        index = body.limb_names.index(limb)
-        places[site] = turns[index] @ np.asarray(place) + origins[index]
-    return places
+    """Sites of the default human."""
+    return sites_at_rest(Body.human(model="full"))
 
 
 @lru_cache
