@@ -195,6 +195,18 @@ class MarkerSet:
         return f"MarkerSet({self.sensor!r}, stamp={self.stamp:.6f}, {len(self.positions)} sites)"
 
 
+def usual_interval(stamps: FloatArray) -> float:
+    """Median time between frames [s]; 1 / ASSUMED_RATE_HZ for a single one."""
+    return float(np.median(np.diff(stamps))) if len(stamps) > 1 else 1.0 / ASSUMED_RATE_HZ
+
+
+def nearest_stamp(stamps: FloatArray, stamp: float, *, within: float) -> int:
+    """Index of the stamp that is nearest to a time, the first one of several; -1 if it is farther than `within` [s]."""
+    away = np.abs(stamps - stamp)
+    index = int(away.argmin())
+    return index if away[index] <= within else -1
+
+
 class Measurement(Protocol):
     """Attributes of every measurement. The classes above and those of other adapters are frozen dataclasses with them."""
 

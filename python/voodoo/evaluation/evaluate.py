@@ -29,7 +29,7 @@ from voodoo.evaluation.people import PeopleScore
 from voodoo.evaluation.people_evaluate import evaluate_people, has_people
 from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M, FrameTable, Score
 from voodoo.export.track import Track
-from voodoo.measurements import ASSUMED_RATE_HZ, FloatArray
+from voodoo.measurements import FloatArray, usual_interval
 from voodoo.names import SEARCHING, Automatic, HumanModel
 from voodoo.pipeline.inputs import pictures_alone
 from voodoo.pipeline.run import track
@@ -290,5 +290,4 @@ def reference_positions(recording: Recording, stamps: FloatArray) -> FloatArray:
     if reference is None:
         return np.full((len(stamps), len(metrics.JOINTS), 3), np.nan)
     table = metrics.places_of(reference.names, reference.positions)
-    period = float(np.median(np.diff(reference.stamps))) if len(reference.stamps) > 1 else 1.0 / ASSUMED_RATE_HZ
-    return metrics.match_reference(stamps, reference.stamps, table, tolerance=0.5 * period)
+    return metrics.match_reference(stamps, reference.stamps, table, tolerance=0.5 * usual_interval(reference.stamps))

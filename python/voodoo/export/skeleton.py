@@ -16,7 +16,7 @@ import numpy.typing as npt
 import voodoo._core as _core
 from voodoo.errors import VoodooError
 from voodoo.export.track import Track
-from voodoo.measurements import ASSUMED_RATE_HZ, FloatArray
+from voodoo.measurements import FloatArray, usual_interval
 from voodoo.model.at_rest import limbs_at_rest
 from voodoo.model.body import Body
 from voodoo.model.rotations import quaternions
@@ -188,14 +188,11 @@ def ellipsoids(covariances: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def mean_interval(stamps: FloatArray) -> float:
-    """Time between two frames [s], for formats with a constant rate; 1/30 s for a single frame.
+    """The usual interval, for formats with a constant rate.
 
     Raises:
         VoodooError: stamps that do not rise.
     """
-    if len(stamps) < 2:
-        return 1.0 / ASSUMED_RATE_HZ
-    steps = np.diff(stamps)
-    if (steps <= 0.0).any():
+    if (np.diff(stamps) <= 0.0).any():
         raise VoodooError("stamps: expected rising times, found others")
-    return float(np.median(steps))
+    return usual_interval(stamps)

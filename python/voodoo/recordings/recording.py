@@ -13,7 +13,7 @@ from typing import TypedDict, TypeVar
 import numpy as np
 
 from voodoo.errors import RecordingError
-from voodoo.measurements import ByteImage, DepthImage, FloatArray, Measurement, RecordedFrame
+from voodoo.measurements import ByteImage, DepthImage, FloatArray, Measurement, RecordedFrame, nearest_stamp
 from voodoo.model.joint import short
 from voodoo.model.standing import is_optical
 from voodoo.recordings.empty_scene import EmptyScene
@@ -57,8 +57,8 @@ class Reference:
 
     def at(self, stamp: float, names: Sequence[str], *, within: float) -> dict[str, FloatArray]:
         """The known positions (3,) of some joints nearest to a time, if they are within so many seconds; else none."""
-        index = int(np.argmin(np.abs(self.stamps - stamp)))
-        if abs(self.stamps[index] - stamp) > within:
+        index = nearest_stamp(self.stamps, stamp, within=within)
+        if index < 0:
             return {}
         row = {name: self.positions[index, self.names.index(name)] for name in names if name in self.names}
         return {name: position for name, position in row.items() if np.isfinite(position).all()}
