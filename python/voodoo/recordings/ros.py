@@ -88,7 +88,7 @@ class RosRecording(Recording):
         scale = _MILLIMETER if unit is None else unit
         self._left_out = left_out
         if unpacked_gb is not None:
-            unpacked_gb = number_option(path, "unpacked_gb", unpacked_gb, "gigabytes > 0", most=1e6)
+            unpacked_gb = number_option(path, "unpacked_gb", unpacked_gb)
         self.numbers: dict[tuple[str, float], int] = {}
         self._bag = Bag(path, left_out=left_out, unpacked=None if unpacked_gb is None else int(unpacked_gb * 1e9))
         self.loader = "ros2" if self._bag.is_ros2 else "ros1"
@@ -188,9 +188,9 @@ class RosRecording(Recording):
         units = realsense.beside(topic, realsense.UNITS)
         if given or not self._bag.realsense or all(item.name != units for item in self._bag.topics):
             return otherwise
-        with reading(f"{self.path}, topic {units}", "a readable message"):
-            found = float(f"{self._bag.first(str(units)).data:.7g}")
-            return number_option(self.path, str(units), found, "a length > 0", most=1e3)
+        where = f"{self.path}, topic {units}"
+        with reading(where, "a readable message"):
+            return number_option(where, "meters_per_unit", float(f"{self._bag.first(str(units)).data:.7g}"))
 
     def _read_transforms(self, asked: str | None, sources: Sequence[TopicSource]) -> str:
         """Fill the transform tree and choose the root frame."""
