@@ -152,7 +152,7 @@ def evaluate_all(
     others = set(multiprocessing.active_children())
     with children():  # starts a helper process of multiprocessing
         pool = ProcessPoolExecutor(
-            min(jobs, len(paths)), mp_context=multiprocessing.get_context("spawn"), initializer=_one_thread
+            min(jobs, len(paths)), mp_context=multiprocessing.get_context("spawn"), initializer=use_one_thread
         )
     done = False
     try:
@@ -185,9 +185,9 @@ def _deaf_children() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _one_thread() -> None:
+def use_one_thread() -> None:
     """Initialize a worker: one thread each, because the processes run in parallel."""
-    os.environ["RAYON_NUM_THREADS"] = "1"
+    os.environ.setdefault("RAYON_NUM_THREADS", "1")
     cv2.setNumThreads(1)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from voodoo.errors import BodyError, VoodooError
+from voodoo.errors import BodyError, VoodooError, shortened
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 Number = Annotated[float, Field(allow_inf_nan=False)]
@@ -239,4 +239,4 @@ def short(value: object) -> str:
         text = repr(value)
     except Exception:  # nested too deeply, or an object whose repr fails
         text = f"a {type(value).__name__} that cannot be shown"
-    return text if len(text) < 80 else text[:77] + "..."
+    return shortened(text, most=80)
