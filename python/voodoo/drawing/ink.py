@@ -31,6 +31,11 @@ def point(pixel: npt.NDArray[np.floating]) -> tuple[int, int]:
     return x, y
 
 
+def drawable(pixels: npt.NDArray[np.floating]) -> npt.NDArray[np.bool_]:
+    """Which pixels (..., 2) are known, and near enough for these numbers."""
+    return np.asarray((np.abs(pixels) < 1e5).all(axis=-1))
+
+
 def side_color(name: str) -> Color:
     """Color by side: blue for the person's left, orange for the right, gray for the middle."""
     return LEFT if name.startswith("l_") else RIGHT if name.startswith("r_") else MIDDLE

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate, SiteRay
-from voodoo.drawing.ink import RAY, SUBPIXEL, Color, Picture, point
+from voodoo.drawing.ink import RAY, SUBPIXEL, Color, Picture, drawable, point
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, KeypointImage
 from voodoo.model.body import Body
 from voodoo.model.projection import NEAREST_M, CameraView, View, limb_silhouette
@@ -80,7 +80,7 @@ class Canvas:
             reach = float((estimate.joints[ray.site] - ray.origin) @ ray.direction)
             along = ray.origin + np.outer((reach - _RAY_HALF_M, reach, reach + _RAY_HALF_M), ray.direction)
             pixels, _ = self.view.project(along)
-            if not (np.isfinite(pixels).all() and np.abs(pixels).max() < 1e5):
+            if not drawable(pixels).all():
                 continue
             start, middle, end = (point(pixel) for pixel in pixels)
             cv2.line(self.picture, start, end, RAY, 1, cv2.LINE_AA, SUBPIXEL)
