@@ -106,8 +106,8 @@ class Chain:
         images: Sequence[Silhouette],
         *,
         world_from_base: npt.ArrayLike | None = None,
-        margin: float = 1.1,
-        thin: float = 1.7,
+        margin: float = Options.margin,
+        thin: float = Options.thin,
         bones: Sequence[Bone] | None = None,
         others: Mapping[str, npt.ArrayLike] | None = None,
     ) -> tuple[float, FloatArray]:

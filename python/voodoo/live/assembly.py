@@ -15,7 +15,7 @@ from voodoo.errors import RecordingError, VoodooError
 from voodoo.live.source import Arrival, Faults
 from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.model.camera import Camera
-from voodoo.pipeline.frozen import unchanged
+from voodoo.pipeline.frozen import STRIDE, unchanged
 from voodoo.pipeline.pairing import WAIT_S
 from voodoo.recordings.recording import refuse_blank
 
@@ -119,7 +119,6 @@ _STALE_S = 0.5
 """A measurement that is older than its frame by more does not belong to it."""
 _PENDING = 4
 _FAR_M = 100.0
-_STRIDE = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,7 +275,7 @@ class Assembler:
     def _refuse_far(self, item: DepthImage) -> None:
         if item.image.dtype.kind != "f":
             return
-        observed = item.image[::_STRIDE, ::_STRIDE]
+        observed = item.image[::STRIDE, ::STRIDE]
         meters = observed[np.isfinite(observed) & (observed > 0.0)] * item.meters_per_unit
         if meters.size and float(np.median(meters)) > _FAR_M:
             where, found = f"{item.sensor}, stamp {item.stamp:.6f}", f"a median of {np.median(meters):.0f}"
