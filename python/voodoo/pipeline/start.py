@@ -200,7 +200,7 @@ def _known_stature(
         raise VoodooError(f"body, height and age: expected at most one of them, found {' and '.join(given)}")
     if age is not None:
         if not _AGES[0] <= number_of("age", age, "years") <= OLDEST:
-            raise VoodooError(f"age: expected {_AGES[0]:g} to {OLDEST} years, found {age}")
+            raise VoodooError(f"age: expected {_AGES[0]:g} to {OLDEST:g} years, found {age}")
         height = float(np.interp(age, _AGES, _STATURES_M))
     if height is not None and detector == "shipped":
         from voodoo._core import Detector
