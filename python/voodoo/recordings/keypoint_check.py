@@ -13,7 +13,9 @@ import numpy as np
 from voodoo.errors import RecordingError
 from voodoo.measurements import DepthImage, FloatArray, KeypointImage
 from voodoo.model.camera import Camera
+from voodoo.model.projection import transform
 from voodoo.model.rays import passing
+from voodoo.model.transforms import inverse
 from voodoo.recordings.keypoint_layouts import LAYOUTS, LIMBS, layout_by_shape, layout_of
 
 S = TypeVar("S")
@@ -316,8 +318,7 @@ def _nearest(image: KeypointImage, depth: DepthImage) -> FloatArray:
     z, rays = depth.meters(), depth.camera.rays().astype(np.float64)
     valid = np.isfinite(z) & np.isfinite(rays).all(axis=2)
     points = np.column_stack([rays[valid] * z[valid][:, None], z[valid]])
-    pose = np.linalg.inv(image.root_from_sensor) @ depth.root_from_sensor
-    points = points @ pose[:3, :3].T + pose[:3, 3]
+    points = transform(inverse(image.root_from_sensor) @ depth.root_from_sensor, points)
     cells = np.floor(image.camera.project(points) / _CELL)
     shape = np.array([image.camera.width, image.camera.height]) // _CELL + 1
     inside = (np.isfinite(cells) & (cells >= 0) & (cells < shape)).all(axis=1)
