@@ -227,7 +227,7 @@ class Fake(Output):
 
 
 def test_receivers_that_hang_die_and_return_hold_nobody_and_are_named_once(monkeypatch):
-    monkeypatch.setattr("voodoo.live.session._LATE_S", 0.1)
+    monkeypatch.setattr("voodoo.live.session.LATE_S", 0.1)
     monkeypatch.setattr("voodoo.live.session._BACK_S", 0.05)
     monkeypatch.setattr("voodoo.live.session._CLOSE_S", 0.2)
     good, hangs, dies, swift = Fake("good"), Fake("hangs"), Fake("dies"), Fake("swift", waits=False)
@@ -393,7 +393,7 @@ def test_websocket_sends_what_the_page_describes():
 
 
 def test_a_receiver_that_hangs_holds_nobody_up_and_gets_the_newest_when_it_wakes(monkeypatch):
-    monkeypatch.setattr("voodoo.live.sinks.websocket._LATE_S", 0.2)
+    monkeypatch.setattr("voodoo.live.sinks.websocket.LATE_S", 0.2)
     body, messages, slowest = voodoo.Body.human(), [], 0.0
     track = track_of(body)
     sink = opened("ws://:0", messages)

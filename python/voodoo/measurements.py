@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.model.camera import Camera
+from voodoo.model.joint import FloatArray as FloatArray
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 ByteImage: TypeAlias = npt.NDArray[np.uint8]
 DepthArray: TypeAlias = npt.NDArray[np.uint16] | npt.NDArray[np.float32]
 ASSUMED_RATE_HZ = 30.0
@@ -193,6 +193,18 @@ class MarkerSet:
     def __repr__(self) -> str:
         """One line with the number of sites."""
         return f"MarkerSet({self.sensor!r}, stamp={self.stamp:.6f}, {len(self.positions)} sites)"
+
+
+def usual_interval(stamps: FloatArray) -> float:
+    """Median time between frames [s]; 1 / ASSUMED_RATE_HZ for a single one."""
+    return float(np.median(np.diff(stamps))) if len(stamps) > 1 else 1.0 / ASSUMED_RATE_HZ
+
+
+def nearest_stamp(stamps: FloatArray, stamp: float, *, within: float) -> int:
+    """Index of the stamp that is nearest to a time, the first one of several; -1 if it is farther than `within` [s]."""
+    away = np.abs(stamps - stamp)
+    index = int(away.argmin())
+    return index if away[index] <= within else -1
 
 
 class Measurement(Protocol):

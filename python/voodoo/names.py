@@ -6,6 +6,8 @@ from typing import Literal, TypeAlias, get_args
 
 Automatic: TypeAlias = Literal["auto"]
 """Requests a search, even if a first pose comes with the recording."""
+OLDEST = 120.0
+"""Greatest age of a person in years."""
 HumanModel: TypeAlias = Literal["measured", "full", "papers"]
 """Models of the default human, see `voodoo.Body.human`."""
 TopicKind: TypeAlias = Literal["depth", "points", "scan", "color"]

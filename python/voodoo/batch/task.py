@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -21,7 +20,7 @@ from voodoo.batch.summary import DONE, FAILED, REPORTS, Row
 from voodoo.config import Config
 from voodoo.errors import RecordingError, installed
 from voodoo.evaluation import metrics
-from voodoo.evaluation.evaluate import compare
+from voodoo.evaluation.evaluate import compare, use_one_thread
 from voodoo.export.people import PeopleTrack
 from voodoo.export.table import columns_of as columns_of_rows
 from voodoo.export.track import Track
@@ -154,7 +153,7 @@ def do(job: Job) -> Row:
         Nothing: errors are in the row.
     """
     began = time.perf_counter()
-    _one_thread()
+    use_one_thread()
     if job.limit_s is not None:  # for what cannot be interrupted; a part of the time is for what can
         faulthandler.dump_traceback_later(job.limit_s + _GRACE_S, exit=True, file=_NOWHERE)
     try:
@@ -292,9 +291,3 @@ def _error(recording: Recording, result: Track) -> float:
     if recording.reference is None:
         return float("nan")
     return metrics.mean_or_nan(compare(recording, result, at_best_lag=not recording.reference.exact))
-
-
-def _one_thread() -> None:
-    """The tasks run in parallel, so each uses one thread."""
-    os.environ.setdefault("RAYON_NUM_THREADS", "1")
-    cv2.setNumThreads(1)

@@ -13,7 +13,7 @@ import typer
 
 from voodoo.cli.common import refuse_both
 from voodoo.errors import VoodooError
-from voodoo.names import INPUTS, TOPIC_KINDS, Automatic, HumanModel
+from voodoo.names import INPUTS, OLDEST, TOPIC_KINDS, Automatic, HumanModel
 from voodoo.recordings.keypoint_layouts import LAYOUTS
 from voodoo.recordings.loaders import LOADERS
 
@@ -35,7 +35,7 @@ HeightOption = Annotated[
 ]
 AgeOption = Annotated[
     float | None,
-    typer.Option(metavar="YEARS", min=1.0, max=120.0, help="Age of the person, where the stature is not known."),
+    typer.Option(metavar="YEARS", min=1.0, max=OLDEST, help="Age of the person, where the stature is not known."),
 ]
 InitOption = Annotated[
     str | None,

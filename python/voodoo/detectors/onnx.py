@@ -109,7 +109,7 @@ class OnnxDetector:
         if image.floor is not None:
             normal, offset = np.asarray(image.floor[0], dtype=np.float64), image.floor[1]
             height = offset - float(normal @ image.world_from_sensor[:3, 3])
-            floor = ((np.linalg.inv(image.world_from_sensor)[:3, :3] @ normal).tolist(), height)
+            floor = ((normal @ image.world_from_sensor[:3, :3]).tolist(), height)
         return person_candidates(image.depth, camera=image.camera, floor=floor, most=self._most)
 
     def _person(

@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 Picture: TypeAlias = npt.NDArray[np.uint8]
 """(H, W, 3) BGR."""
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 Color: TypeAlias = tuple[int, int, int]
 """BGR."""
 
@@ -30,6 +29,11 @@ def point(pixel: npt.NDArray[np.floating]) -> tuple[int, int]:
     """One pixel (2,) as OpenCV's fixed-point numbers."""
     x, y = (int(value) for value in fixed(pixel))
     return x, y
+
+
+def drawable(pixels: npt.NDArray[np.floating]) -> npt.NDArray[np.bool_]:
+    """Which pixels (..., 2) are known, and near enough for these numbers."""
+    return np.asarray((np.abs(pixels) < 1e5).all(axis=-1))
 
 
 def side_color(name: str) -> Color:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate, SiteRay
-from voodoo.drawing.ink import RAY, SUBPIXEL, Color, Picture, point
+from voodoo.drawing.ink import RAY, SUBPIXEL, Color, Picture, drawable, point
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, KeypointImage
 from voodoo.model.body import Body
 from voodoo.model.projection import NEAREST_M, CameraView, View, limb_silhouette
@@ -80,7 +80,7 @@ class Canvas:
             reach = float((estimate.joints[ray.site] - ray.origin) @ ray.direction)
             along = ray.origin + np.outer((reach - _RAY_HALF_M, reach, reach + _RAY_HALF_M), ray.direction)
             pixels, _ = self.view.project(along)
-            if not (np.isfinite(pixels).all() and np.abs(pixels).max() < 1e5):
+            if not drawable(pixels).all():
                 continue
             start, middle, end = (point(pixel) for pixel in pixels)
             cv2.line(self.picture, start, end, RAY, 1, cv2.LINE_AA, SUBPIXEL)
@@ -220,14 +220,14 @@ class Log:
 
     def silhouettes(self, path: str, item: Pictured) -> None:
         """Log the silhouettes of the limbs in the camera's image at a path."""
-        silhouettes, colors = [], []
+        silhouettes, colors, of_limb = [], [], limb_colors(self.body)
+        view = CameraView(item.camera, item.root_from_sensor)
         for limb in self.body.limbs if self.estimate.joints else ():
-            view = CameraView(item.camera, item.root_from_sensor)
             contour = limb_silhouette(limb.shape, self.estimate.world_from_limb[limb.name], view)
             if contour is not None:
                 corners = cv2.approxPolyDP(contour, _SILHOUETTE_PX, closed=True).reshape(-1, 2)
                 silhouettes.append(np.vstack([corners, corners[:1]]) + 0.5)
-                colors.append(limb_colors(self.body)[limb.name])
+                colors.append(of_limb[limb.name])
         self.send(f"{path}/picture/model", self.rr.LineStrips2D(silhouettes, radii=0.5, colors=colors))
 
     def depth(self, path: str, image: npt.NDArray[Any], meters_per_unit: float) -> None:

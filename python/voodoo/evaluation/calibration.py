@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,11 +10,12 @@ import numpy as np
 
 from voodoo._core import Estimate
 from voodoo.evaluation import metrics
-from voodoo.evaluation.metrics import BoolArray, FloatArray, mean_or_nan
+from voodoo.evaluation.metrics import BoolArray, mean_or_nan
+from voodoo.measurements import FloatArray
 
 DROPPED = 0.2
 """Fraction of the joints that are dropped for the sparsification: the most uncertain ones, or the worst."""
-NORMAL = (0.683, 0.954)
+NORMAL = tuple(math.erf(number / math.sqrt(2.0)) for number in (1, 2))
 """Fractions within one and two standard deviations of a normal distribution."""
 
 ARM = np.array([name.split("_")[1] in ("shoulder", "elbow", "wrist") for name in metrics.JOINTS])

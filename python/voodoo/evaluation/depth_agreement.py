@@ -17,8 +17,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from voodoo._core import Estimate
-from voodoo.evaluation.metrics import BoolArray, FloatArray, fraction_within, mean_or_nan
-from voodoo.measurements import DepthImage, PointCloud, RecordedFrame
+from voodoo.evaluation.metrics import BoolArray, fraction_within, mean_or_nan
+from voodoo.measurements import DepthImage, FloatArray, PointCloud, RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.projection import CameraView, body_mask, limb_rings, transform
 from voodoo.recordings.keypoint_layouts import of_both_sides

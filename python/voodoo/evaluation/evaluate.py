@@ -24,12 +24,12 @@ from voodoo.errors import RecordingError, VoodooError
 from voodoo.evaluation import metrics
 from voodoo.evaluation.calibration import Deviations, sigma_of
 from voodoo.evaluation.depth_agreement import WITHIN_M, Selection, witness
-from voodoo.evaluation.metrics import BoolArray, FloatArray
+from voodoo.evaluation.metrics import BoolArray
 from voodoo.evaluation.people import PeopleScore
 from voodoo.evaluation.people_evaluate import evaluate_people, has_people
 from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M, FrameTable, Score
 from voodoo.export.track import Track
-from voodoo.measurements import ASSUMED_RATE_HZ
+from voodoo.measurements import FloatArray, usual_interval
 from voodoo.names import SEARCHING, Automatic, HumanModel
 from voodoo.pipeline.inputs import pictures_alone
 from voodoo.pipeline.run import track
@@ -152,7 +152,7 @@ def evaluate_all(
     others = set(multiprocessing.active_children())
     with children():  # starts a helper process of multiprocessing
         pool = ProcessPoolExecutor(
-            min(jobs, len(paths)), mp_context=multiprocessing.get_context("spawn"), initializer=_one_thread
+            min(jobs, len(paths)), mp_context=multiprocessing.get_context("spawn"), initializer=use_one_thread
         )
     done = False
     try:
@@ -185,9 +185,9 @@ def _deaf_children() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _one_thread() -> None:
+def use_one_thread() -> None:
     """Initialize a worker: one thread each, because the processes run in parallel."""
-    os.environ["RAYON_NUM_THREADS"] = "1"
+    os.environ.setdefault("RAYON_NUM_THREADS", "1")
     cv2.setNumThreads(1)
 
 
@@ -242,8 +242,8 @@ def _score(
         lost_without_offsets=np.nan if class_without is None else float(class_without == 0),
         first_pose_s=first_wait,
         first_pose_error_m=first_error,
-        within_5cm=metrics.fraction_within(errors, 0.05),
-        within_10cm=metrics.fraction_within(errors, 0.10),
+        within_5cm=metrics.fraction_within(errors, WITHIN_M),
+        within_10cm=metrics.fraction_within(errors, LIMIT_EXACT_M),
         joint_error_m={name: metrics.mean_or_nan(errors[:, index]) for index, name in enumerate(metrics.JOINTS)},
         tracking_class=class_,
         lost_joints=tuple(name for index, name in enumerate(metrics.JOINTS) if lost[:, index].any()),
@@ -290,5 +290,4 @@ def reference_positions(recording: Recording, stamps: FloatArray) -> FloatArray:
     if reference is None:
         return np.full((len(stamps), len(metrics.JOINTS), 3), np.nan)
     table = metrics.places_of(reference.names, reference.positions)
-    period = float(np.median(np.diff(reference.stamps))) if len(reference.stamps) > 1 else 1.0 / ASSUMED_RATE_HZ
-    return metrics.match_reference(stamps, reference.stamps, table, tolerance=0.5 * period)
+    return metrics.match_reference(stamps, reference.stamps, table, tolerance=0.5 * usual_interval(reference.stamps))

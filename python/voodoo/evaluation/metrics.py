@@ -11,10 +11,9 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.measurements import ROUNDED_S
+from voodoo.measurements import ROUNDED_S, FloatArray, nearest_stamp, usual_interval
 from voodoo.recordings.keypoint_layouts import LIMBS
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 
 LIMB_JOINTS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
@@ -52,12 +51,9 @@ def match_reference(
 
     They are not interpolated, because a reference with the frames' rate has one value for every frame.
     """
-    after = np.clip(np.searchsorted(reference_stamps, stamps), 0, len(reference_stamps) - 1)
-    before = np.maximum(after - 1, 0)
-    nearer = np.abs(reference_stamps[before] - stamps) <= np.abs(reference_stamps[after] - stamps)
-    index = np.where(nearer, before, after)
+    index = np.array([nearest_stamp(reference_stamps, stamp, within=tolerance) for stamp in stamps], dtype=np.intp)
     matched = positions[index].astype(np.float64)
-    matched[np.abs(reference_stamps[index] - stamps) > tolerance] = np.nan
+    matched[index < 0] = np.nan
     return matched
 
 
@@ -177,7 +173,7 @@ def lost_frames(far: BoolArray, known: BoolArray, stamps: FloatArray) -> BoolArr
     observed = np.flatnonzero(known)
     if len(observed) == 0:
         return lost
-    period = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
+    period = usual_interval(stamps)
     flags = np.concatenate([[False], far[observed], [False]])
     edges = np.flatnonzero(flags[1:] != flags[:-1])
     for first, end in zip(edges[::2], edges[1::2], strict=True):
@@ -238,7 +234,7 @@ def standing_still(reference: FloatArray, stamps: FloatArray) -> BoolArray:
     """
     frames = len(reference)
     still = np.zeros(reference.shape[:2], dtype=bool)
-    period = float(np.median(np.diff(stamps))) if frames > 1 else 0.0
+    period = usual_interval(stamps)
     reach = max(round(STILL_S / period), 1) if period > 0.0 else frames
     if frames <= 2 * reach:
         return still

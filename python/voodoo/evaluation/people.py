@@ -19,8 +19,8 @@ import numpy.typing as npt
 import voodoo._core as _core
 from voodoo.errors import VoodooError, installed
 from voodoo.evaluation import metrics
-from voodoo.evaluation.metrics import FloatArray
 from voodoo.export.table import Arrays
+from voodoo.measurements import FloatArray, nearest_stamp
 from voodoo.recordings.people_truth import PeopleTruth
 
 MATCH_M = 0.5
@@ -196,8 +196,8 @@ _Indices: TypeAlias = npt.NDArray[np.int64]
 def _frames(truth: PeopleTruth, rows: Arrays) -> tuple[FloatArray, _Indices, list[_Indices]]:
     """Stamps, the truth's row and the result's rows of each frame, see Matches."""
     own, row = np.unique(rows["stamps"], return_inverse=True)
-    near = np.clip(np.searchsorted(truth.stamps, own - SAME_TIME_S), 0, len(truth.stamps) - 1)
-    same = np.abs(truth.stamps[near] - own) <= SAME_TIME_S
+    near = np.array([nearest_stamp(truth.stamps, stamp, within=SAME_TIME_S) for stamp in own], dtype=np.intp)
+    same = near >= 0
     if len(own) and not same.any():
         raise VoodooError(
             f"result: expected stamps of the truth, {truth.stamps[0]:.6f} to {truth.stamps[-1]:.6f} s, found "

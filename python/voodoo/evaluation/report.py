@@ -43,8 +43,8 @@ def markdown(scores: Sequence[Score], tables: Sequence[FrameTable | None] = ()) 
         "lag 0 against exact truth and at the best lag against a reference; a positive lag means that the estimate is "
         "late.\n"
     ]
-    text += ["| sequence | frames | class | error | best lag | within 10 cm | depth within 5 cm | IoU | lost joints |"]
-    text += ["|---|---|---|---|---|---|---|---|---|"]
+    columns = "sequence, frames, class, error, best lag, within 10 cm, depth within 5 cm, IoU, lost joints"
+    text += table_head(columns.split(", "))
     for score in scores:
         if score.failure:
             text.append(f"| {score.name} | - | - | failed, see below | | | | | |")

@@ -11,7 +11,8 @@ import numpy as np
 
 from voodoo.evaluation.calibration import Deviations
 from voodoo.evaluation.depth_agreement import Selection
-from voodoo.evaluation.metrics import BoolArray, FloatArray
+from voodoo.evaluation.metrics import BoolArray
+from voodoo.measurements import FloatArray
 
 LIMIT_EXACT_M, LIMIT_REFERENCE_M = 0.10, 0.15
 """Distances from exact truth, and from another tracker's skeleton, beyond which a joint is lost [m]."""

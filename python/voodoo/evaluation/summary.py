@@ -16,7 +16,7 @@ from voodoo.evaluation import metrics
 from voodoo.evaluation.score import PERCENT, Form, FrameTable, Score
 from voodoo.whole import write_whole
 
-CLASSES = (0, 1, 2)
+CLASSES = range(3)
 KINDS = {True: "exact truth", False: "reference skeleton", None: "no reference"}
 """What a sequence is compared with, by `Score.exact`."""
 

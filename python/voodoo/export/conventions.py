@@ -9,7 +9,8 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from voodoo.export.skeleton import FloatArray, Skeleton
+from voodoo.export.skeleton import Skeleton
+from voodoo.measurements import FloatArray
 from voodoo.model.rotations import axes, euler_angles
 
 Y_UP_RIGHT = axes("x z -y")

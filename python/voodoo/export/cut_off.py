@@ -10,10 +10,8 @@ from rosbags.interfaces import Connection
 
 from voodoo.errors import RecordingError, reading
 from voodoo.export.ros2 import STORE, bag
-from voodoo.recordings.mcap_file import check_mcap, records, stored_records
+from voodoo.recordings.mcap_file import CHANNEL, MESSAGE, SCHEMA, check_mcap, records, stored_records
 from voodoo.whole import move_whole
-
-_SCHEMA, _CHANNEL, _MESSAGE = 3, 4, 5
 
 
 def complete(source: Path, path: Path) -> None:
@@ -27,7 +25,7 @@ def complete(source: Path, path: Path) -> None:
     try:
         check_mcap(source)
     except RecordingError:
-        if any(code == _MESSAGE for code, _ in _sound(source)):
+        if any(code == MESSAGE for code, _ in _sound(source)):
             _write(source, path)
     else:
         move_whole(source, path)
@@ -39,11 +37,11 @@ def _write(source: Path, path: Path) -> None:
     with bag(path) as writer:
         for code, body in _sound(source):
             one, other = struct.unpack_from("<HH", body)
-            if code == _SCHEMA:
+            if code == SCHEMA:
                 kinds[one] = _word(body, 2)
-            elif code == _CHANNEL:
+            elif code == CHANNEL:
                 topics[one] = writer.add_connection(_word(body, 4), kinds[other], typestore=STORE)
-            elif code == _MESSAGE:
+            elif code == MESSAGE:
                 writer.write(topics[one], struct.unpack_from("<Q", body, 6)[0], body[22:])
 
 

@@ -14,10 +14,10 @@ from voodoo.errors import VoodooError, installed
 from voodoo.export.conventions import JOINT_COLOR, JOINT_M, limb_color
 from voodoo.export.human_frames import placed_names
 from voodoo.export.layout import FoxgloveAbout, rows_of
-from voodoo.export.skeleton import FloatArray
 from voodoo.export.template import STAMP_NS, template
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, upright
+from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
 from voodoo.whole import appearing_whole
 

@@ -14,8 +14,9 @@ import numpy.typing as npt
 from voodoo.drawing.ink import person_color
 from voodoo.errors import VoodooError
 from voodoo.export.conventions import Y_UP_LEFT, names_of
-from voodoo.export.skeleton import Bone, FloatArray, held, mean_interval, placed_on_parents, skeleton
+from voodoo.export.skeleton import Bone, held, mean_interval, placed_on_parents, skeleton
 from voodoo.export.track import Track
+from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
 from voodoo.model.projection import limb_mesh
 from voodoo.model.rotations import quaternions

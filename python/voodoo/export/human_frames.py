@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.export.conventions import NAMES
-from voodoo.export.skeleton import FloatArray
+from voodoo.measurements import FloatArray
 
 FRAMES = {limb: names.rep155 for limb, names in NAMES.items() if names.rep155}
 """REP-155 frame of each limb of the default humans; other limbs (the neck) keep their own name."""

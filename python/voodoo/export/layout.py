@@ -10,8 +10,9 @@ import numpy as np
 
 import voodoo._core as _core
 from voodoo.export.human_frames import angle_plan, frame_plan
-from voodoo.export.skeleton import FloatArray, check_limbs, own_joints
+from voodoo.export.skeleton import check_limbs, own_joints
 from voodoo.export.track import Track
+from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
 from voodoo.model.rotations import matrix_of_turn
 

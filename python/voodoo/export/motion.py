@@ -16,9 +16,10 @@ import numpy as np
 
 from voodoo.errors import VoodooError
 from voodoo.export.conventions import Y_UP_LEFT, Y_UP_RIGHT, coordinates, names_of, plain
-from voodoo.export.skeleton import FloatArray, held, mean_interval, placed_on_parents, skeleton
+from voodoo.export.skeleton import held, mean_interval, placed_on_parents, skeleton
 from voodoo.export.table import cells
 from voodoo.export.track import Track
+from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
 from voodoo.model.rotations import euler_angles, quaternions
 from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP

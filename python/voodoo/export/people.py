@@ -12,8 +12,9 @@ import numpy.typing as npt
 
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
-from voodoo.export.table import BY_FRAME, Arrays, FloatArray, opened_result, save_result
+from voodoo.export.table import BY_FRAME, Arrays, opened_result, save_result
 from voodoo.export.track import Track, arrays_of, tracks_of
+from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
 from voodoo.names import SEARCHING
 from voodoo.people import PeopleEstimate

@@ -26,11 +26,11 @@ from voodoo.errors import VoodooError
 from voodoo.export.conventions import JOINT_COLOR, JOINT_M, Color, limb_color
 from voodoo.export.human_frames import placed_names
 from voodoo.export.layout import rows_of
-from voodoo.export.skeleton import FloatArray, ellipsoids
+from voodoo.export.skeleton import ellipsoids
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, by_axes, upright
 from voodoo.export.urdf import urdf
-from voodoo.measurements import ColorImage, DepthImage
+from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.model.body import Body
 from voodoo.model.projection import CameraView
 from voodoo.model.rotations import quaternions
@@ -53,7 +53,7 @@ for _fields, _kind in (
 TF, JOINTS = "tf2_msgs/msg/TFMessage", "sensor_msgs/msg/JointState"
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 _MARKER = "visualization_msgs/msg/Marker"
-_SPHERE, _CYLINDER, _SPHERES, _DELETE_ALL = 2, 3, 7, 3
+_KINDS: Any = STORE.types[_MARKER]
 _SPREAD_COLOR: Color = {"r": 0.9, "g": 0.9, "b": 0.9, "a": 0.3}
 
 
@@ -224,7 +224,7 @@ class _Human:
         at = float(self.track.stamps[index])
         header = header_at(at, self.root)
         messages: dict[str, Any] = {}
-        drawn = [new(_MARKER, header=header, action=_DELETE_ALL)]
+        drawn = [new(_MARKER, header=header, action=_KINDS.DELETEALL)]
         if self._displayed[index]:
             angles, rows, sure = self._rows[index]
             placed = [(parent, name, row) for (parent, name), row in zip(self._frames, rows.tolist(), strict=True)]
@@ -279,13 +279,13 @@ def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  #
     for number, (limb, pose) in enumerate(zip(body.limbs, poses, strict=True)):
         middle = pose[:3, :3] @ np.array([0.0, 0.0, limb.shape.length / 2]) + pose[:3, 3]
         size = (limb.shape.a0 + limb.shape.a1, limb.shape.b0 + limb.shape.b1, limb.shape.length)
-        add("limbs", _CYLINDER, (*middle, *turns[number]), size, limb_color(limb.name), id=number)
+        add("limbs", _KINDS.CYLINDER, (*middle, *turns[number]), size, limb_color(limb.name), id=number)
     points = [_geometry("Point", position) for position in track.joints[index].tolist()]
-    add("joints", _SPHERES, (*[0.0] * 6, 1.0), (JOINT_M,) * 3, JOINT_COLOR, points=points)
+    add("joints", _KINDS.SPHERE_LIST, (*[0.0] * 6, 1.0), (JOINT_M,) * 3, JOINT_COLOR, points=points)
     known = np.isfinite(track.covariance[index]).all(axis=(1, 2)).nonzero()[0]
     sizes, axes = ellipsoids(track.covariance[index][known])
     for number, turn, size in zip(known.tolist(), axes, 2.0 * sizes, strict=True):
-        add("uncertainty", _SPHERE, (*track.joints[index, number], *turn), size, _SPREAD_COLOR, id=number)
+        add("uncertainty", _KINDS.SPHERE, (*track.joints[index, number], *turn), size, _SPREAD_COLOR, id=number)
     return result
 
 

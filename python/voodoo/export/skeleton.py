@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -17,13 +16,13 @@ import numpy.typing as npt
 import voodoo._core as _core
 from voodoo.errors import VoodooError
 from voodoo.export.track import Track
-from voodoo.measurements import ASSUMED_RATE_HZ
+from voodoo.measurements import FloatArray, usual_interval
 from voodoo.model.at_rest import limbs_at_rest
 from voodoo.model.body import Body
 from voodoo.model.rotations import quaternions
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
-_MOVES_M = 1e-4
+SAME_M = 1e-4
+"""Lengths that differ by less are the same: numbers of files have this precision."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +175,7 @@ def placed_on_parents(
     places = posed.offsets()
     known = places[found] if found.any() else places
     still = np.median(known, axis=0)
-    moving = np.abs(known - still).max(axis=(0, 2)) > _MOVES_M
+    moving = np.abs(known - still).max(axis=(0, 2)) > SAME_M
     places[:, 0], moving[0] = posed.heads[:, 0], True
     return places, still, moving
 
@@ -189,14 +188,11 @@ def ellipsoids(covariances: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def mean_interval(stamps: FloatArray) -> float:
-    """Time between two frames [s], for formats with a constant rate; 1/30 s for a single frame.
+    """The usual interval, for formats with a constant rate.
 
     Raises:
         VoodooError: stamps that do not rise.
     """
-    if len(stamps) < 2:
-        return 1.0 / ASSUMED_RATE_HZ
-    steps = np.diff(stamps)
-    if (steps <= 0.0).any():
+    if (np.diff(stamps) <= 0.0).any():
         raise VoodooError("stamps: expected rising times, found others")
-    return float(np.median(steps))
+    return usual_interval(stamps)

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import VoodooError, a_path, columns_in, naming, reading
+from voodoo.measurements import FloatArray as FloatArray
 from voodoo.stored import MOST_RECORDED, check_stored, numbers_in
 from voodoo.unpacking import stored_arrays
 from voodoo.whole import appearing_whole
@@ -31,7 +32,6 @@ def check_suffix(path: Path) -> None:
         raise VoodooError(f"{path}: expected a name that ends in {' or '.join(SUFFIXES)}, found {path.suffix!r}")
 
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 Arrays: TypeAlias = Mapping[str, npt.NDArray[Any]]
 """Arrays of a result, or of a part of it, by the names of docs/reference/files.md#results."""
 

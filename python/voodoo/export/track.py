@@ -12,10 +12,11 @@ import numpy.typing as npt
 
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
-from voodoo.export.table import BY_FRAME, Arrays, FloatArray, joint_sigma, opened_result, save_result
+from voodoo.export.table import BY_FRAME, Arrays, joint_sigma, opened_result, save_result
 from voodoo.ik.angles import angle_names as angle_names_of
 from voodoo.ik.angles import angles_of
 from voodoo.ik.chain import Chain
+from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
 from voodoo.names import SEARCHING
 

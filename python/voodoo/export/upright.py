@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from voodoo.export.table import FloatArray
 from voodoo.export.track import Track
+from voodoo.measurements import FloatArray
 from voodoo.model.rotations import axes
 from voodoo.model.standing import HIGH_M, is_optical, standing_along
 from voodoo.model.transforms import pose_of

@@ -19,7 +19,7 @@ from types import MappingProxyType
 
 from voodoo._core import Estimate
 from voodoo.ik.chain import Chain
-from voodoo.ik.values import FloatArray
+from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
 
 _ROOT = 6

@@ -11,7 +11,8 @@ import numpy.typing as npt
 import voodoo._core as _core
 from voodoo.errors import BodyError, MeasurementError, of_kind
 from voodoo.ik.image import Silhouette, core_views
-from voodoo.ik.values import Bone, FloatArray, Options, base_pose, listed_bones, listed_poses, named, numbers, vector
+from voodoo.ik.values import Bone, Options, base_pose, listed_bones, listed_poses, named, numbers, vector
+from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
 from voodoo.model.joint import short
 
@@ -105,8 +106,8 @@ class Chain:
         images: Sequence[Silhouette],
         *,
         world_from_base: npt.ArrayLike | None = None,
-        margin: float = 1.1,
-        thin: float = 1.7,
+        margin: float = Options.margin,
+        thin: float = Options.thin,
         bones: Sequence[Bone] | None = None,
         others: Mapping[str, npt.ArrayLike] | None = None,
     ) -> tuple[float, FloatArray]:

@@ -4,23 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 import voodoo._core as _core
+from voodoo.drawing.ink import SUBPIXEL
 from voodoo.errors import MeasurementError, of_kind
 from voodoo.ik.values import numbers
-from voodoo.model.camera import Camera
+from voodoo.model.camera import Camera, pixels_seen
 from voodoo.model.transforms import inverse, rigid
 
 _UNDISTORTED = 0.5
 _MIDDLE = 0.3
 """A pixel belongs to the medial axis if no step of one pixel increases the distance by more than the step minus this value; a
 smaller value gives more such pixels."""
-_SUBPIXEL_BITS = 4
 _WIDEST = 1000.0
 
 
@@ -136,9 +135,9 @@ def local_thickness(distance: npt.NDArray[np.float32]) -> npt.NDArray[np.float32
     rows, columns = np.nonzero(middle)
     radii = inside[rows, columns]
     order = np.argsort(radii, kind="stable")
-    one = 1 << _SUBPIXEL_BITS
+    one = 1 << SUBPIXEL
     for u, v, radius in zip(columns[order].tolist(), rows[order].tolist(), radii[order].tolist(), strict=True):
-        cv2.circle(thickness, (u * one, v * one), round(radius * one), radius, cv2.FILLED, shift=_SUBPIXEL_BITS)
+        cv2.circle(thickness, (u * one, v * one), round(radius * one), radius, cv2.FILLED, shift=SUBPIXEL)
     return np.where(inside > 0.0, np.maximum(thickness, inside), np.float32(0.0)).astype(np.float32)
 
 
@@ -156,7 +155,7 @@ def _depths(depth: npt.ArrayLike, camera: Camera, person: npt.NDArray[np.uint8])
         )
     if camera.distorted:
         # Interpolation would give depths between two surfaces.
-        at = _distorted_pixels(camera)
+        at = pixels_seen(camera, _pinhole(camera))
         found = np.asarray(cv2.remap(found, at[..., 0], at[..., 1], cv2.INTER_NEAREST), dtype=np.float64)
     # Outside the person the silhouette gives the evidence.
     return np.ascontiguousarray(np.where(person != 0, found, 0.0), dtype=np.float32)
@@ -169,19 +168,6 @@ def _pinhole(camera: Camera) -> Camera:
 
 def _undistorted(mask: npt.NDArray[np.uint8], camera: Camera) -> npt.NDArray[np.uint8]:
     """The mask as a pinhole camera of the same focal lengths and center would see it."""
-    at = _distorted_pixels(camera)
+    at = pixels_seen(camera, _pinhole(camera))
     soft = cv2.remap(mask.astype(np.float32), at[..., 0], at[..., 1], cv2.INTER_LINEAR)
     return np.asarray(soft >= _UNDISTORTED, dtype=np.uint8)
-
-
-@lru_cache(maxsize=8)
-def _distorted_pixels(camera: Camera) -> npt.NDArray[np.float32]:
-    """Pixels (height, width, 2) in the distorted image for each pixel of that pinhole camera. Cached: it is the same for all
-    images of a camera, and takes longer to compute than the rest of a silhouette."""
-    u, v = np.meshgrid(np.arange(camera.width, dtype=np.float64), np.arange(camera.height, dtype=np.float64))
-    rays = _pinhole(camera).undistorted(np.column_stack([u.reshape(-1), v.reshape(-1)]))
-    # Directions that the lens does not map are outside the image.
-    pixels = np.nan_to_num(camera.project(np.column_stack([rays, np.ones(len(rays))])), nan=-9.0)
-    at = pixels.astype(np.float32).reshape(camera.height, camera.width, 2)
-    at.setflags(write=False)
-    return at

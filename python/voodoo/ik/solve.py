@@ -14,7 +14,6 @@ from voodoo.errors import BodyError, MeasurementError
 from voodoo.ik.chain import Chain
 from voodoo.ik.image import Silhouette, core_views
 from voodoo.ik.values import (
-    FloatArray,
     Options,
     Target,
     Targets,
@@ -25,6 +24,7 @@ from voodoo.ik.values import (
     target_parts,
     vector,
 )
+from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
 
 

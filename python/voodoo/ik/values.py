@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 import voodoo._core as _core
 from voodoo.errors import MeasurementError
+from voodoo.measurements import FloatArray
 from voodoo.model.joint import numbers_of, short
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 Vector: TypeAlias = Sequence[float] | FloatArray
 Bone: TypeAlias = tuple[str, str, float]
 """Two sites and the radius [m] around the segment between them that must lie inside the silhouettes."""

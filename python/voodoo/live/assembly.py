@@ -15,7 +15,7 @@ from voodoo.errors import RecordingError, VoodooError
 from voodoo.live.source import Arrival, Faults
 from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.model.camera import Camera
-from voodoo.pipeline.frozen import unchanged
+from voodoo.pipeline.frozen import STRIDE, unchanged
 from voodoo.pipeline.pairing import WAIT_S
 from voodoo.recordings.recording import refuse_blank
 
@@ -119,7 +119,6 @@ _STALE_S = 0.5
 """A measurement that is older than its frame by more does not belong to it."""
 _PENDING = 4
 _FAR_M = 100.0
-_STRIDE = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +143,6 @@ class Assembler:
 
     Args:
         faults: counts unusable measurements.
-        wait: how long a frame waits for the measurements that belong to it [s].
         eager: decode images at once, not at first access.
 
     Attributes:
@@ -153,12 +151,12 @@ class Assembler:
         kinds: sensor -> kind, for all arrivals.
     """
 
-    def __init__(self, faults: Faults, *, wait: float = WAIT_S, eager: bool = True) -> None:
+    def __init__(self, faults: Faults, *, eager: bool = True) -> None:
         """Start without arrivals."""
         self.refused = self.frames = 0
         self.kinds: dict[str, str] = {}
         self.host = HostTime()
-        self._faults, self._wait, self._eager = faults, wait, eager
+        self._faults, self._eager = faults, eager
         self._stamps: dict[str, Stamps] = {}
         self._others: dict[str, deque[Arrival]] = {}
         self._driver: tuple[Arrival, float] | None = None
@@ -215,7 +213,7 @@ class Assembler:
         driver, arrived = self._driver
         waited = now - arrived
         for_transforms = 0.0 if driver.ready() else driver.patience - waited
-        for_pictures = 0.0 if self._is_complete(driver.stamp) else self._wait - waited
+        for_pictures = 0.0 if self._is_complete(driver.stamp) else WAIT_S - waited
         return max(for_transforms, for_pictures, 0.0)
 
     def _is_complete(self, stamp: float) -> bool:
@@ -225,8 +223,8 @@ class Assembler:
             if kind not in ("color", "keypoints", "depth") or judged.last is None or sensor not in self._others:
                 continue
             # The camera's next image was due by then and has not arrived.
-            missing = self._wait < stamp - judged.last < _STALE_S
-            if missing and judged.last + 0.9 * judged.period <= stamp + self._wait:
+            missing = WAIT_S < stamp - judged.last < _STALE_S
+            if missing and judged.last + 0.9 * judged.period <= stamp + WAIT_S:
                 return False
         return True
 
@@ -235,7 +233,7 @@ class Assembler:
         found: list[Measurement] = []
         for pending in self._others.values():
             due = []
-            while pending and pending[0].stamp <= stamp + self._wait:
+            while pending and pending[0].stamp <= stamp + WAIT_S:
                 arrival = pending.popleft()
                 if stamp - arrival.stamp <= _STALE_S:
                     due.append(arrival)
@@ -276,7 +274,7 @@ class Assembler:
     def _refuse_far(self, item: DepthImage) -> None:
         if item.image.dtype.kind != "f":
             return
-        observed = item.image[::_STRIDE, ::_STRIDE]
+        observed = item.image[::STRIDE, ::STRIDE]
         meters = observed[np.isfinite(observed) & (observed > 0.0)] * item.meters_per_unit
         if meters.size and float(np.median(meters)) > _FAR_M:
             where, found = f"{item.sensor}, stamp {item.stamp:.6f}", f"a median of {np.median(meters):.0f}"

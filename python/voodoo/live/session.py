@@ -22,11 +22,11 @@ from voodoo.measurements import FloatArray
 from voodoo.pipeline.run import decodable
 
 _RATE_S = 2.0
-_LATE_S = 1.0
+LATE_S = 1.0
 """A receiver that holds a pose up for this long is named."""
 _BACK_S = 1.0
 """A receiver that takes every pose for this long is back."""
-_HANGS = "takes nothing; it gets the newest pose when it does"
+HANGS = "takes nothing; it gets the newest pose when it does"
 _CLOSE_S = 3.0
 """How long the end waits for receivers."""
 
@@ -122,8 +122,8 @@ class _Lane:
     def check_late(self) -> None:
         """Name a receiver that holds a pose up."""
         output, began = self._busy or (None, 0.0)
-        if output is not None and output.receiver and time.monotonic() - began > _LATE_S:
-            self._name(output, _HANGS)
+        if output is not None and output.receiver and time.monotonic() - began > LATE_S:
+            self._name(output, HANGS)
 
     def finish(self) -> None:
         """Process the waiting steps and close the outputs."""

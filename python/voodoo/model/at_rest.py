@@ -7,11 +7,9 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from voodoo.model.body import STATURE_M, Body
-
-FloatArray = npt.NDArray[np.float64]
+from voodoo.model.joint import FloatArray
 
 
 def limbs_at_rest(body: Body) -> tuple[FloatArray, FloatArray]:
@@ -27,11 +25,9 @@ def limbs_at_rest(body: Body) -> tuple[FloatArray, FloatArray]:
 def sites_at_rest(body: Body) -> dict[str, FloatArray]:
     """Positions (3,) [m] of the sites."""
     turns, origins = limbs_at_rest(body)
-    places = {}
-    for site, limb, place in body.core.parts()[2]:
-        index = body.limb_names.index(limb)
-        places[site] = turns[index] @ np.asarray(place) + origins[index]
-    return places
+    numbers = {limb: index for index, limb in enumerate(body.limb_names)}
+    sites = body.core.parts()[2]
+    return {site: turns[numbers[limb]] @ np.asarray(place) + origins[numbers[limb]] for site, limb, place in sites}
 
 
 @lru_cache(maxsize=1)

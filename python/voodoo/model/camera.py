@@ -182,6 +182,17 @@ def _rays(camera: Camera) -> npt.NDArray[np.float32]:
     return rays
 
 
+@lru_cache(maxsize=8)
+def pixels_seen(camera: Camera, other: Camera) -> npt.NDArray[np.float32]:
+    """Pixels (H, W, 2) in the images of a camera for each pixel of another one at its place, for `cv2.remap`; outside where the
+    lens has none. Cached, because it takes long."""
+    rays = other.rays().reshape(-1, 2)
+    pixels = np.nan_to_num(camera.project(np.column_stack([rays, np.ones(len(rays))])), nan=-1e3)
+    at = pixels.astype(np.float32).reshape(other.height, other.width, 2)
+    at.setflags(write=False)
+    return at
+
+
 def _numbers(name: str, values: Any, *, count: int | None = None) -> tuple[float, ...]:  # noqa: ANN401 - checked here
     """The numbers of an iterable, or of an array of any shape row by row."""
     try:

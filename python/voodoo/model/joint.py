@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from voodoo.errors import BodyError, VoodooError
+from voodoo.errors import BodyError, VoodooError, shortened
 
+FloatArray: TypeAlias = npt.NDArray[np.float64]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Vector = tuple[Number, Number, Number]
 Range = tuple[Number, Number]
@@ -177,7 +178,7 @@ def number_of(name: str, value: object, expected: str = "a number", *, error: ty
         raise error(f"{name}: expected {expected}, found {short(value)}") from None
 
 
-def as_numbers(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+def as_numbers(values: npt.ArrayLike) -> FloatArray:
     """An array of real numbers.
 
     Raises:
@@ -196,7 +197,7 @@ def numbers_of(
     expected: str = "numbers",
     *,
     count: int | None = None,
-) -> npt.NDArray[np.float64]:
+) -> FloatArray:
     """An array of real numbers given by the caller; with a `count`, so many finite ones in a row.
 
     Raises:
@@ -211,7 +212,7 @@ def numbers_of(
         raise error(f"{what}: expected {expected}, found {short(values)}") from None
 
 
-def numbers_or_nan(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+def numbers_or_nan(values: npt.ArrayLike) -> FloatArray:
     """An array of real numbers; of other values a single NaN, in one dimension."""
     try:
         return as_numbers(values)
@@ -238,4 +239,4 @@ def short(value: object) -> str:
         text = repr(value)
     except Exception:  # nested too deeply, or an object whose repr fails
         text = f"a {type(value).__name__} that cannot be shown"
-    return text if len(text) < 80 else text[:77] + "..."
+    return shortened(text, most=80)

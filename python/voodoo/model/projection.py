@@ -12,8 +12,9 @@ import numpy.typing as npt
 from voodoo._core import Estimate, TaperedEllipticCylinder
 from voodoo.model.body import Body
 from voodoo.model.camera import Camera
+from voodoo.model.joint import FloatArray
+from voodoo.model.transforms import inverse
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 Axes: TypeAlias = Literal["rep103", "optical"]
 
 NEAREST_M = 0.05
@@ -36,8 +37,7 @@ class CameraView:
 
     def project(self, points_root: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Pixels (N, 2) of points (N, 3) [m], NaN for invisible points, and their depths (N,) [m] along the optical axis."""
-        sensor_from_root = np.linalg.inv(self.root_from_sensor)
-        points = points_root @ sensor_from_root[:3, :3].T + sensor_from_root[:3, 3]
+        points = transform(inverse(self.root_from_sensor), points_root)
         points[points[:, 2] < NEAREST_M] = np.nan
         # Integer coordinates are pixel centers, so scaling includes an offset of half a pixel.
         return (self.camera.project(points) + 0.5) * self.scale - 0.5, points[:, 2]

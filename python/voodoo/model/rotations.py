@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 import voodoo._core as _core
-
-FloatArray = npt.NDArray[np.float64]
+from voodoo.model.joint import FloatArray
 
 
 def axes(words: str) -> FloatArray:
@@ -27,9 +26,14 @@ def quaternions(rotations: FloatArray) -> FloatArray:
     matrices = np.ascontiguousarray(rotations, dtype=np.float64)
     found, skewed = _core.quaternions(matrices)
     if skewed:
-        left, _, right = np.linalg.svd(matrices)
-        found, _ = _core.quaternions(left @ right)
+        found, _ = _core.quaternions(nearest_rotations(matrices))
     return found
+
+
+def nearest_rotations(matrices: FloatArray) -> FloatArray:
+    """The rotations (..., 3, 3) nearest to matrices that are approximately rotations."""
+    left, _, right = np.linalg.svd(matrices)
+    return np.asarray(left @ right)
 
 
 def matrix_of_quaternion(quaternion: tuple[float, float, float, float]) -> FloatArray:

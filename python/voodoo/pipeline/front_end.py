@@ -18,7 +18,7 @@ import voodoo._core as _core
 from voodoo._core import Estimate, Frame
 from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
-from voodoo.names import INPUTS, SEARCHING
+from voodoo.names import SEARCHING
 from voodoo.people import ONE, Followed, People, PeopleEstimate, everybody
 from voodoo.pipeline.frozen import FrozenSensors
 from voodoo.pipeline.pairing import paired
@@ -27,11 +27,11 @@ from voodoo.sensors.adapters import NOBODY, Context, Memory, adapters_of, all_ad
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.keypoints.sites import KeypointReport
 from voodoo.sensors.rays import SiteRay
-from voodoo.sensors.settings import LEVEL_FRAMES, FrontEndSettings
+from voodoo.sensors.settings import FrontEndSettings
 from voodoo.sensors.skin.tracker import SkinTracker
 from voodoo.tracker import Tracker
 
-__all__ = ["INPUTS", "LEVEL_FRAMES", "ONE", "FrontEnd", "FrontEndSettings", "nobody", "paired"]
+__all__ = ["FrontEnd", "FrontEndSettings", "nobody", "paired"]
 
 E = TypeVar("E", Estimate, PeopleEstimate)
 E_co = TypeVar("E_co", Estimate, PeopleEstimate, covariant=True)

@@ -19,7 +19,7 @@ from voodoo.export.table import SUFFIXES
 from voodoo.export.track import Track
 from voodoo.model.body import STATURE_M, Body
 from voodoo.model.joint import number_of, short, valid
-from voodoo.names import Automatic, HumanModel
+from voodoo.names import OLDEST, Automatic, HumanModel
 from voodoo.people import People
 from voodoo.pipeline.starts import Starts
 from voodoo.pipeline.starts.given import EarlierStart, GivenStart
@@ -35,8 +35,6 @@ from voodoo.tracker import Tracker
 _AGES = (1.0, 2.0, 4.0, 8.0, 12.0, 15.0, 18.0)
 _STATURES_M = (0.75, 0.87, 1.03, 1.27, 1.50, 1.65, 1.70)
 """Median stature at these ages in years, mean of girls and boys (WHO Child Growth Standards, 2006; growth reference, 2007)."""
-_OLDEST = 120
-"""Greatest age in years."""
 _HEIGHT_SIGMA, _AGE_SIGMA = 0.02, 0.05
 """Relative standard deviations of a stature that is given, with shoes and hair, and of the statures of one age."""
 
@@ -201,8 +199,8 @@ def _known_stature(
     if len(given) > 1:
         raise VoodooError(f"body, height and age: expected at most one of them, found {' and '.join(given)}")
     if age is not None:
-        if not _AGES[0] <= number_of("age", age, "years") <= _OLDEST:
-            raise VoodooError(f"age: expected {_AGES[0]:g} to {_OLDEST} years, found {age}")
+        if not _AGES[0] <= number_of("age", age, "years") <= OLDEST:
+            raise VoodooError(f"age: expected {_AGES[0]:g} to {OLDEST:g} years, found {age}")
         height = float(np.interp(age, _AGES, _STATURES_M))
     if height is not None and detector == "shipped":
         from voodoo._core import Detector

@@ -18,7 +18,7 @@ from voodoo.errors import CameraError, RecordingError, installed, naming, readin
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, Measurement, RecordedFrame
 from voodoo.model.camera import Camera
 from voodoo.model.joint import short
-from voodoo.model.transforms import is_rigid, pose_of
+from voodoo.model.transforms import inverse, is_rigid, pose_of
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.pictures import decode_color
 from voodoo.recordings.recording import Recording, SensorInfo, usable
@@ -96,7 +96,7 @@ class AzureKinectRecording(Recording):
                 self._tracks[tracks["COLOR"][0]] = "color"
                 mode = tags.get("K4A_COLOR_MODE", "").removeprefix("MJPG_")
                 self._color = _camera(path, cameras, _COLOR, mode)
-                self._depth_from_color = np.linalg.inv(_pose(path, cameras, _COLOR)).astype(np.float64)
+                self._depth_from_color = inverse(_pose(path, cameras, _COLOR))
             self._times: dict[str, list[float]] = {sensor: [] for sensor in self._tracks.values()}
             self._stamps = self._times["depth"]
             for sensor, stamp, _ in self._packets(film):

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-import cv2
 import numpy as np
 from pydantic import Field, StrictBool
 from ruamel.yaml import YAML
@@ -18,6 +17,7 @@ from voodoo.errors import CameraError, RecordingError, naming, reading
 from voodoo.measurements import FloatArray
 from voodoo.model.camera import LENS_NAMES, Camera
 from voodoo.model.joint import Strict, numbers_or_nan, short, valid
+from voodoo.model.rotations import matrix_of_turn, nearest_rotations
 from voodoo.model.toml_io import parse_toml, read_text
 from voodoo.model.transforms import is_rigid, pose_of
 from voodoo.recordings.mcap_file import is_plain_yaml
@@ -98,7 +98,7 @@ def _placed(where: str, key: str, table: dict[str, Any], meters_per_unit: float)
     camera = camera_of(where, table)
     turn = _numbers(where, table, "rotation", None)
     if turn.shape != (3, 3):
-        turn = np.asarray(cv2.Rodrigues(_numbers(where, table, "rotation", (3,)))[0], dtype=np.float64)
+        turn = matrix_of_turn(_numbers(where, table, "rotation", (3,)))
     elif not is_rigid(pose_of(turn), off=1e-3):
         raise RecordingError(f"{where}, rotation: expected a rotation, found {short(table['rotation'])}")
     pose = pose_of(turn.T, -turn.T @ _numbers(where, table, "translation", (3,)) * meters_per_unit)
@@ -303,7 +303,4 @@ def _pose(rows: Any, where: str) -> FloatArray:  # noqa: ANN401 - checked here
             f"{where}: root_from_sensor: expected four rows of a rigid 4x4 transform, found {short(rows)}"
         )
     # A matrix typed with three or four digits is only approximately a rotation, but the tracker needs an exact one.
-    if not np.allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), rtol=0.0, atol=_ROUNDING):
-        u, _, v = np.linalg.svd(pose[:3, :3])
-        pose[:3, :3] = u @ v
-    return pose
+    return pose if is_rigid(pose, off=_ROUNDING) else pose_of(nearest_rotations(pose[:3, :3]), pose[:3, 3])

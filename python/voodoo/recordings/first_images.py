@@ -95,8 +95,7 @@ def first_images(recording: Recording) -> tuple[list[FirstImage], str]:
 
 def _of(item: DepthImage | ColorImage) -> FirstImage:
     image, camera = item.image, item.camera
-    rays = camera.rays().reshape(camera.height, camera.width, 2)
-    across, down = rays[camera.height // 2, :, 0], rays[:, camera.width // 2, 1]
+    across, down = camera.rays()[camera.height // 2, :, 0], camera.rays()[:, camera.width // 2, 1]
     angles = (float(np.rad2deg(np.ptp(np.arctan(line[np.isfinite(line)])))) for line in (across, down))
     kind = {"u": "unsigned", "f": "float"}.get(image.dtype.kind, image.dtype.name)
     return FirstImage(

@@ -95,7 +95,7 @@ class FolderRecording(Recording):
         self.name = path.resolve().name
         self._left_out = left_out
         self.numbers: dict[tuple[str, float], int] = {}
-        rate = None if rate is None else number_option(path, "rate", rate, "images per second > 0", most=1e4)
+        rate = None if rate is None else number_option(path, "rate", rate)
         clock = FrameClock(rate)
         set_back = SetBack()
         self._depth = _listing(path, "depth", DEPTH_SUFFIXES, clock, left_out, set_back)

@@ -13,6 +13,9 @@ import numpy as np
 from voodoo.errors import RecordingError
 from voodoo.measurements import DepthImage, FloatArray, KeypointImage
 from voodoo.model.camera import Camera
+from voodoo.model.projection import transform
+from voodoo.model.rays import passing
+from voodoo.model.transforms import inverse
 from voodoo.recordings.keypoint_layouts import LAYOUTS, LIMBS, layout_by_shape, layout_of
 
 S = TypeVar("S")
@@ -30,8 +33,6 @@ _CONFIDENT = 0.3
 _FEWEST = 20
 """Distances, or limbs, that a judgment needs."""
 _FEWEST_OF_A_PERSON = 5
-_PARALLEL = 0.05
-"""Sine of the angle between two rays below which their distance says nothing."""
 _OUTSIDE, _MOST_OUTSIDE = 0.05, 0.1
 """Networks guess joints a little outside of a picture: by this share of its size, and this share of the keypoints."""
 _INSTANTS = 8
@@ -157,10 +158,10 @@ def agreement(instants: Sequence[Instant], change: Change = lambda at, _: at, *,
                 continue
             for one in few:
                 # Networks list people in any order: the other camera's person is the one whose rays pass nearest.
-                met = [_meeting(one, other) for other in many]
+                met = [passing(*one, *other) for other in many]
                 met = [each for each in met if len(each[0]) >= _FEWEST_OF_A_PERSON]
                 if met:
-                    away, places = min(met, key=lambda each: float(np.median(each[0])))
+                    away, places, _ = min(met, key=lambda each: float(np.median(each[0])))
                     distances.append(away)
                     spreads.append(float(np.median(np.linalg.norm(places - np.median(places, axis=0), axis=1))))
     gathered = np.concatenate(distances) if distances else np.empty(0)
@@ -177,25 +178,6 @@ def _rays(image: KeypointImage, rows: FloatArray, change: Change) -> tuple[Float
     with np.errstate(over="ignore", invalid="ignore"):  # keypoints of damaged files are any numbers
         turned = ahead @ image.root_from_sensor[:3, :3].T
         return image.root_from_sensor[:3, 3], turned / np.linalg.norm(turned, axis=1, keepdims=True)
-
-
-def _meeting(
-    left: tuple[FloatArray, FloatArray], right: tuple[FloatArray, FloatArray]
-) -> tuple[FloatArray, FloatArray]:
-    """Distances (N,) of the rays of N keypoints that both cameras see, and the points (N, 3) halfway between them.
-
-    Where they would meet behind a camera, the distance is that of its center.
-    """
-    (a, along_a), (b, along_b) = left, right
-    cosine = np.einsum("ij,ij->i", along_a, along_b)
-    crossing = 1.0 - cosine**2
-    used = crossing > _PARALLEL**2
-    along_a, along_b, cosine, crossing = along_a[used], along_b[used], cosine[used], crossing[used]
-    base = b - a
-    on_a = np.maximum((along_a @ base - cosine * (along_b @ base)) / crossing, 0.0)
-    on_b = np.maximum((cosine * (along_a @ base) - along_b @ base) / crossing, 0.0)
-    place_a, place_b = a + on_a[:, None] * along_a, b + on_b[:, None] * along_b
-    return np.linalg.norm(place_a - place_b, axis=1), (place_a + place_b) / 2.0
 
 
 def _reading(instants: Sequence[Instant], *, sizes: Sequence[float]) -> tuple[Agreement, str] | None:
@@ -336,8 +318,7 @@ def _nearest(image: KeypointImage, depth: DepthImage) -> FloatArray:
     z, rays = depth.meters(), depth.camera.rays().astype(np.float64)
     valid = np.isfinite(z) & np.isfinite(rays).all(axis=2)
     points = np.column_stack([rays[valid] * z[valid][:, None], z[valid]])
-    pose = np.linalg.inv(image.root_from_sensor) @ depth.root_from_sensor
-    points = points @ pose[:3, :3].T + pose[:3, 3]
+    points = transform(inverse(image.root_from_sensor) @ depth.root_from_sensor, points)
     cells = np.floor(image.camera.project(points) / _CELL)
     shape = np.array([image.camera.width, image.camera.height]) // _CELL + 1
     inside = (np.isfinite(cells) & (cells >= 0) & (cells < shape)).all(axis=1)

@@ -23,11 +23,11 @@ from voodoo.unpacking import Unpacking
 
 T = TypeVar("T")
 _MAGIC = b"\x89MCAP0\r\n"
-_FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _MESSAGE_INDEX, _DATA_END = 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x0F
+_FOOTER, SCHEMA, CHANNEL, MESSAGE, _CHUNK, _MESSAGE_INDEX, _DATA_END = 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x0F
 _ATTACHMENT, _METADATA = 0x09, 0x0C
-_MOST = {_ATTACHMENT: 2**63} | dict.fromkeys((_CHUNK, _MESSAGE, _MESSAGE_INDEX, _METADATA), MOST_BYTES)
+_MOST = {_ATTACHMENT: 2**63} | dict.fromkeys((_CHUNK, MESSAGE, _MESSAGE_INDEX, _METADATA), MOST_BYTES)
 """Largest size of a record that is more than metadata [bytes]."""
-_MOST_OF_ALL = {_SCHEMA: 16 * MOST_METADATA, _CHANNEL: MOST_METADATA}
+_MOST_OF_ALL = {SCHEMA: 16 * MOST_METADATA, CHANNEL: MOST_METADATA}
 """Largest size of all schemas, and of all channels [bytes]."""
 _ANCHOR = re.compile(r"(?m)(?:^|[\s\[{,])[&*][^\s,\]}]")
 _MOST_NESTED, _MOST_COMMAS = 50, 10_000
@@ -200,7 +200,7 @@ def records(content: bytes) -> Iterator[tuple[int, int, int]]:
 def _messages(content: bytes) -> Iterator[tuple[int, int, int, int]]:
     """Channel and time [ns] of the messages in a chunk, and begin and end of each."""
     for code, begin, end in records(content):
-        if code == _MESSAGE:
+        if code == MESSAGE:
             if end - begin < 22:
                 raise ValueError(f"expected a message of 22 bytes or more, found {end - begin}")
             channel, _, time, _ = struct.unpack_from("<HIQQ", content, begin)
@@ -276,7 +276,7 @@ def check_mcap(path: Path) -> frozenset[int]:
                 raise RecordingError(
                     f"{path}: expected {_MOST_OF_ALL[code]} bytes of schemas or channels at most, found more"
                 )
-            quality = file.read(length).partition(b"offered_qos_profiles")[2] if code == _CHANNEL else b""
+            quality = file.read(length).partition(b"offered_qos_profiles")[2] if code == CHANNEL else b""
             if not is_plain_yaml(quality[4:].decode("latin-1")):
                 raise RecordingError(f"{path}: expected a channel at byte {position}, found nested metadata")
             position += 9 + length

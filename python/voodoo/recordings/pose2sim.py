@@ -75,8 +75,8 @@ class Pose2SimRecording(Recording):
         self._left_out = left_out
         with naming(path, MeasurementError, error=RecordingError):
             layout_of(layout or "body25b")
-        self.rate = number_option(path, "rate", rate, "images per second > 0", most=1e4)
-        scale = number_option(path, "meters_per_unit", meters_per_unit, "a length > 0", most=1e3)
+        self.rate = number_option(path, "rate", rate)
+        scale = number_option(path, "meters_per_unit", meters_per_unit)
         placed = read_camera_toml(calibration_of(path), meters_per_unit=scale)
         folders = keypoint_folders(path)
         chosen = cameras_of(path, placed, folders, ("a folder keypoints/*_json", "cameras"), cameras)

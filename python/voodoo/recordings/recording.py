@@ -13,7 +13,7 @@ from typing import TypedDict, TypeVar
 import numpy as np
 
 from voodoo.errors import RecordingError
-from voodoo.measurements import ByteImage, DepthImage, FloatArray, Measurement, RecordedFrame
+from voodoo.measurements import ByteImage, DepthImage, FloatArray, Measurement, RecordedFrame, nearest_stamp
 from voodoo.model.joint import short
 from voodoo.model.standing import is_optical
 from voodoo.recordings.empty_scene import EmptyScene
@@ -57,8 +57,8 @@ class Reference:
 
     def at(self, stamp: float, names: Sequence[str], *, within: float) -> dict[str, FloatArray]:
         """The known positions (3,) of some joints nearest to a time, if they are within so many seconds; else none."""
-        index = int(np.argmin(np.abs(self.stamps - stamp)))
-        if abs(self.stamps[index] - stamp) > within:
+        index = nearest_stamp(self.stamps, stamp, within=within)
+        if index < 0:
             return {}
         row = {name: self.positions[index, self.names.index(name)] for name in names if name in self.names}
         return {name: position for name, position in row.items() if np.isfinite(position).all()}
@@ -285,17 +285,25 @@ def usable(
     return None
 
 
-def number_option(path: object, name: str, value: object, expected: str, *, most: float, zero: bool = False) -> float:
-    """Check a number given to a loader: above zero (or zero, if allowed) and not above `most`.
+_NUMBERS = {
+    "rate": ("images per second > 0", 1e4), "meters_per_unit": ("a length > 0", 1e3),
+    "tf_max_age": ("seconds >= 0", math.inf), "unpacked_gb": ("gigabytes > 0", 1e6),
+}  # fmt: skip
+"""Options of loaders that are numbers: what is expected, and the greatest one."""
+
+
+def number_option(path: object, name: str, value: object) -> float:
+    """Check one of `_NUMBERS` given to a loader.
 
     Raises:
-        RecordingError: it is not; names the option and what was expected.
+        RecordingError: it is out of range; names the option and what was expected.
     """
+    expected, most = _NUMBERS[name]
     try:
         number = float(value) if not isinstance(value, str) else math.nan  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
         number = math.nan
-    if not (0.0 < number <= most or (zero and number == 0.0)):
+    if not (0.0 < number <= most or (number == 0.0 and "=" in expected)):
         raise RecordingError(f"{path}: {name}: expected {expected}, found {short(value)}")
     return number
 

@@ -16,14 +16,12 @@ from voodoo.recordings.empty_scene import EmptyScene
 from voodoo.recordings.left_out import LeftOut, leave_out, leaving_out
 from voodoo.recordings.recording import Recording, SensorInfo, mean_rate, number_option, usable
 from voodoo.recordings.ros_bag import TF_TYPES, Bag
-from voodoo.recordings.ros_messages import Message, camera_of, measured, stamp_of
+from voodoo.recordings.ros_messages import Message, camera_of, depth_units, measured, stamp_of
 from voodoo.recordings.ros_topics import TopicChoice, TopicFinder, TopicSource, checked_numbers
 from voodoo.recordings.set_back import SetBack, out_of_order
 from voodoo.recordings.together import in_turn, together
 from voodoo.recordings.transforms import TransformTree, matrix
 from voodoo.recordings.truth import OWN_ROOTS, STILL_FRAMES, find_beside, read_beside
-
-_MILLIMETER = 0.001
 
 
 class RosRecording(Recording):
@@ -85,10 +83,9 @@ class RosRecording(Recording):
             raise RecordingError(f"use: expected a tuple of some of {', '.join(TOPIC_KINDS)}, found {use!r}")
         self.path = path
         unit, max_age = checked_numbers(path, meters_per_unit, tf_max_age)
-        scale = _MILLIMETER if unit is None else unit
         self._left_out = left_out
         if unpacked_gb is not None:
-            unpacked_gb = number_option(path, "unpacked_gb", unpacked_gb, "gigabytes > 0", most=1e6)
+            unpacked_gb = number_option(path, "unpacked_gb", unpacked_gb)
         self.numbers: dict[tuple[str, float], int] = {}
         self._bag = Bag(path, left_out=left_out, unpacked=None if unpacked_gb is None else int(unpacked_gb * 1e9))
         self.loader = "ros2" if self._bag.is_ros2 else "ros1"
@@ -97,8 +94,8 @@ class RosRecording(Recording):
         with self._bag.kept_open():
             sources = finder.find(use)
             self._unused = finder.unused
-            self._units = {s.topic: self._unit(s.topic, scale, given=meters_per_unit is not None) for s in sources}
-            self._float_unit = 1.0 if meters_per_unit is None else scale
+            whole, self._float_unit = depth_units(unit)
+            self._units = {s.topic: whole if unit else self._unit(s.topic, whole) for s in sources}
             self._set_back = SetBack()
             self._tree = TransformTree(path, max_age=max_age, set_back=self._set_back)
             self.root_frame = self._read_transforms(root_frame, sources)
@@ -183,14 +180,14 @@ class RosRecording(Recording):
             rate = mean_rate(source.messages, end - first)
             yield SensorInfo(source.topic, source.kind, source.frame, source.messages, rate, source.detail)
 
-    def _unit(self, topic: str, otherwise: float, *, given: bool) -> float:
-        """Scale of 16-bit depth in meters: the value of librealsense's recorder, unless the user sets one."""
+    def _unit(self, topic: str, otherwise: float) -> float:
+        """Scale of 16-bit depth in meters: the value of librealsense's recorder, if there is one."""
         units = realsense.beside(topic, realsense.UNITS)
-        if given or not self._bag.realsense or all(item.name != units for item in self._bag.topics):
+        if not self._bag.realsense or all(item.name != units for item in self._bag.topics):
             return otherwise
-        with reading(f"{self.path}, topic {units}", "a readable message"):
-            found = float(f"{self._bag.first(str(units)).data:.7g}")
-            return number_option(self.path, str(units), found, "a length > 0", most=1e3)
+        where = f"{self.path}, topic {units}"
+        with reading(where, "a readable message"):
+            return number_option(where, "meters_per_unit", float(f"{self._bag.first(str(units)).data:.7g}"))
 
     def _read_transforms(self, asked: str | None, sources: Sequence[TopicSource]) -> str:
         """Fill the transform tree and choose the root frame."""

@@ -232,6 +232,11 @@ def scan_fields(message: Message, source: str) -> dict[str, Any]:
     return {"ranges": message.ranges.astype(np.float32), **numbers}
 
 
+def depth_units(meters_per_unit: float | None) -> tuple[float, float]:
+    """Meters of a unit of 16-bit depth, and of float depth; None: those of REP-118."""
+    return (0.001, 1.0) if meters_per_unit is None else (meters_per_unit, meters_per_unit)
+
+
 def measured(
     kind: str,
     message: Message,

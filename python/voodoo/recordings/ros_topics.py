@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -64,8 +63,8 @@ def checked_numbers(where: object, meters_per_unit: float | None, tf_max_age: fl
         RecordingError: one is out of range; `where` begins the message.
     """
     if meters_per_unit is not None:
-        meters_per_unit = number_option(where, "meters_per_unit", meters_per_unit, "a length > 0", most=1e3)
-    return meters_per_unit, number_option(where, "tf_max_age", tf_max_age, "seconds >= 0", most=math.inf, zero=True)
+        meters_per_unit = number_option(where, "meters_per_unit", meters_per_unit)
+    return meters_per_unit, number_option(where, "tf_max_age", tf_max_age)
 
 
 class TopicFinder:

@@ -219,13 +219,13 @@ class VideosRecording(Recording):
         """Read calibration and the headers of the videos; see the class."""
         self.path, self.name, self.root_frame = path, path.resolve().name, FRAME
         self._left_out = left_out
-        rate = None if rate is None else number_option(path, "rate", rate, "pictures per second > 0", most=1e4)
+        rate = None if rate is None else number_option(path, "rate", rate)
         sources = picture_sources(path)
         if not sources:
             raise RecordingError(f"{path}: expected videos in videos/, or folders of pictures in images/, found none")
         placed = read_camera_toml(
             calibration_of(path, [source.stem for source in sources]),
-            meters_per_unit=number_option(path, "meters_per_unit", meters_per_unit, "a length > 0", most=1e3),
+            meters_per_unit=number_option(path, "meters_per_unit", meters_per_unit),
         )
         clock = FrameClock(rate)
         self._cameras: list[Pictures] = []

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.model.camera import Camera
+from voodoo.model.camera import Camera, pixels_seen
 
 MOST_PIXELS = 640 * 480
 """Larger images are reduced. An edge is located to a pixel or two, which at this size is a centimeter at four meters."""
@@ -36,12 +36,8 @@ class Pinhole:
         self.camera = Camera(width, height, camera.fx * x, camera.fy * y, cx, cy)
         self._maps: tuple[npt.NDArray[Any], npt.NDArray[Any]] | None = None
         if camera.distorted:
-            rays = self.camera.rays().reshape(-1, 2).astype(np.float64)
-            places = camera.project(np.column_stack([rays, np.ones(len(rays))]))
-            # Convert to pixels of the reduced image.
-            places = (places + 0.5) * (x, y) - 0.5
-            # Pixels that the lens does not map come from outside the image.
-            maps = np.nan_to_num(places, nan=-9.0).astype(np.float32).reshape(height, width, 2)
+            # Pixels of the reduced image.
+            maps = ((pixels_seen(camera, self.camera) + 0.5) * (x, y) - 0.5).astype(np.float32)
             self._maps = cv2.convertMaps(maps[..., 0], maps[..., 1], cv2.CV_16SC2)
 
     def apply(self, image: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:

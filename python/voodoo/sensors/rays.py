@@ -11,6 +11,7 @@ import numpy as np
 from voodoo._core import Frame
 from voodoo._core import SiteRay as SiteRay
 from voodoo.measurements import FloatArray
+from voodoo.model.rays import passing
 from voodoo.sensors.model import SensorModel
 
 AGREE_M = 0.08
@@ -19,8 +20,6 @@ TRUSTED = 0.25
 """A ray with less trust does not support the position."""
 _LEAST_TRUST = 0.05
 """Rays with less trust are not used."""
-_PARALLEL = 1e-3
-"""Rays whose directions differ by less than 2 degrees (sine squared) do not determine a position."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,10 +49,9 @@ def place_of(rays: Sequence[SiteRay]) -> TriangulatedSite | None:
     directions = np.array([ray.direction for ray in rays])
     planes = across(directions)
     information = np.array([1.0 / ray.sigma**2 for ray in rays])
-    pairs = map(list, combinations(range(len(rays)), 2))
-    points = [_meeting(origins[pair], directions[pair], planes[pair]) for pair in pairs]
-    known = [point for point in points if point is not None]
-    best = max(known, key=lambda point: trust_at(point, origins, directions).sum(), default=None)
+    one, other = np.array(list(combinations(range(len(rays)), 2))).T
+    _, points, ahead = passing(origins[one], directions[one], origins[other], directions[other])
+    best = max(points[ahead], key=lambda point: trust_at(point, origins, directions).sum(), default=None)
     found = None if best is None else met(origins, directions, information, best)
     if found is None:
         return None
@@ -64,15 +62,6 @@ def place_of(rays: Sequence[SiteRay]) -> TriangulatedSite | None:
     matrix = (information[seeing, None, None] * planes[seeing]).sum(axis=0)
     least = float(np.linalg.eigvalsh(matrix)[0])
     return TriangulatedSite(point, least**-0.5, trust) if least > 0.0 else None
-
-
-def _meeting(origins: FloatArray, directions: FloatArray, planes: FloatArray) -> FloatArray | None:
-    """The point nearest to two rays; None for parallel ones, and behind a camera."""
-    if 1.0 - float(directions[0] @ directions[1]) ** 2 < _PARALLEL:
-        return None
-    point = np.linalg.solve(planes.sum(axis=0), np.einsum("nij,nj->i", planes, origins))
-    ahead = np.einsum("nj,nj->n", point - origins, directions)
-    return np.asarray(point) if (ahead > 0.0).all() else None
 
 
 _STEPS = 20

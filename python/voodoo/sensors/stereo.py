@@ -12,7 +12,7 @@ import numpy.typing as npt
 from voodoo.errors import MeasurementError
 from voodoo.measurements import ByteImage, FloatArray
 from voodoo.model.camera import Camera
-from voodoo.model.transforms import pose_of, rigid
+from voodoo.model.transforms import inverse, pose_of, rigid
 from voodoo.sensors.model import RangeNoise, stereo_noise
 
 _FRACTIONS = 16  # StereoSGBM gives sixteenths of a pixel
@@ -83,7 +83,7 @@ class StereoPair:
             raise MeasurementError(
                 f"stereo: expected 0 < nearest < farthest and an odd block, found {nearest!r}, {farthest!r}, {block!r}"
             )
-        size, right_from_left = (left.width, left.height), np.linalg.inv(pose)
+        size, right_from_left = (left.width, left.height), inverse(pose)
         lenses = [(camera.matrix, np.array(camera.distortion or (0.0,) * 4)) for camera in (left, right)]
         turn, shift = right_from_left[:3, :3], right_from_left[:3, 3:]
         turn_left, turn_right, project_left, project_right, _, _, _ = cv2.stereoRectify(

@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 
 from voodoo._core import Estimate, TaperedEllipticCylinder
-from voodoo.drawing.ink import INK, PAPER, SUBPIXEL, Color, FloatArray, Picture, fixed, person_color, point, side_color
+from voodoo.drawing.ink import INK, PAPER, SUBPIXEL, Color, Picture, drawable, fixed, person_color, point, side_color
+from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
 from voodoo.model.projection import View, limb_mesh, limb_silhouette, transform
 from voodoo.people import PeopleEstimate, Person
@@ -81,7 +82,7 @@ def _number(picture: Picture, person: Person, view: View) -> None:
     """Draw the number above the head."""
     places = np.array(list(person.estimate.joints.values()), dtype=np.float64)
     pixels = view.project(places)[0]
-    pixels = pixels[np.isfinite(pixels).all(axis=1) & (np.abs(pixels) < 1e5).all(axis=1)]
+    pixels = pixels[drawable(pixels)]
     if not len(pixels):
         return
     size = picture.shape[0] / 500.0
@@ -122,7 +123,7 @@ def _draw_spread(picture: Picture, estimate: Estimate, view: View, color: Color 
     moved = np.stack([view.project(places + _STEP_M * axis)[0] for axis in np.eye(3)], axis=2)
     jacobians = (moved - pixels[:, :, None]) / _STEP_M
     layer = picture.copy()
-    visible = (depths > 0.0) & np.isfinite(jacobians).all(axis=(1, 2)) & (np.abs(pixels).max(axis=1) < 1e5)
+    visible = (depths > 0.0) & np.isfinite(jacobians).all(axis=(1, 2)) & drawable(pixels)
     for index, name in enumerate(estimate.joints):
         if visible[index]:
             spread = jacobians[index] @ covariances[index] @ jacobians[index].T
@@ -141,7 +142,7 @@ def _draw_sites(picture: Picture, estimate: Estimate, view: View, color: Color |
     pixels, _ = view.project(np.array(list(estimate.joints.values()), dtype=np.float64))
     radius = max(3, round(picture.shape[0] / 160))
     for name, pixel in zip(estimate.joints, pixels, strict=True):
-        if np.isfinite(pixel).all() and np.abs(pixel).max() < 1e5:
+        if drawable(pixel):
             center = point(pixel)
             cv2.circle(picture, center, (radius + 2) << SUBPIXEL, PAPER, -1, cv2.LINE_AA, SUBPIXEL)
             cv2.circle(picture, center, (radius + 1) << SUBPIXEL, color or side_color(name), -1, cv2.LINE_AA, SUBPIXEL)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from voodoo.errors import RecordingError, reading
-from voodoo.export.ros2 import STORE
+from voodoo.export.ros2 import STORE, TF
 from voodoo.live.clock import Clock
 from voodoo.live.source import Arrival, Faults, faulty
 from voodoo.measurements import FloatArray, Measurement
@@ -18,6 +18,7 @@ from voodoo.recordings.ros_messages import (
     DEPTH_ENCODINGS,
     Message,
     camera_of,
+    depth_units,
     frame_of,
     is_depth,
     measured,
@@ -25,13 +26,13 @@ from voodoo.recordings.ros_messages import (
     stamp_of,
 )
 from voodoo.recordings.ros_topics import CAMERA_INFO, CLOUD, COMPRESSED, IMAGES, MEASURED, SCAN, info_topic
+from voodoo.recordings.set_back import BACK_S
 from voodoo.recordings.transforms import TransformTree
+from voodoo.recordings.truth import OWN_ROOTS, STILL_FRAMES
 
-TF = "tf2_msgs/msg/TFMessage"
-STANDING = ("odom", "map", "base_link", "world")
+STANDING = (*STILL_FRAMES, *OWN_ROOTS)
 """Root frames, best first: the first two are fixed to the room while a robot moves."""
 _KEPT_S = 10.0
-_JUMP_S = 1.0
 _TF_PATIENCE_S = 0.05
 ROOT_PATIENCE_S = 1.0
 """How long the first frame waits for a chain of transforms to one of STANDING."""
@@ -68,7 +69,7 @@ class RosFeed:
         """Start without messages."""
         self.unusable = 0
         self._topics, self.faults, self.clock = tuple(topics), faults, clock
-        self._units = (0.001, 1.0) if meters_per_unit is None else (meters_per_unit, meters_per_unit)
+        self._units = depth_units(meters_per_unit)
         self._pose = sensor_pose
         self._tree = TransformTree("tf", max_age=tf_max_age)
         self._lock = threading.Lock()  # transforms arrive in one thread and are read in another
@@ -124,7 +125,7 @@ class RosFeed:
         for item in message.transforms:
             stamp = seconds(item.header.stamp)
             if not static:
-                if stamp < self._newest - _JUMP_S:
+                if stamp < self._newest - BACK_S:
                     self._tree.keep(stamp - _KEPT_S, stamp)  # later transforms are in the future
                     self._newest = stamp
                 self._newest = max(self._newest, stamp)

@@ -12,9 +12,9 @@ import numpy as np
 from voodoo._core import Estimate
 from voodoo.export.layout import Layout, layout_of
 from voodoo.export.ros2 import person_id
-from voodoo.export.skeleton import FloatArray
 from voodoo.export.upright import SUFFIX, Turn, by_axes
 from voodoo.live.follow import Step
+from voodoo.measurements import FloatArray
 
 
 class PosedPeople(NamedTuple):

@@ -20,7 +20,7 @@ import voodoo._core as _core
 from voodoo.errors import VoodooError, installed
 from voodoo.export.layout import Layout
 from voodoo.live.follow import Step
-from voodoo.live.session import Output
+from voodoo.live.session import HANGS, LATE_S, Output
 from voodoo.live.sinks import parts_of
 from voodoo.live.sinks.people import posed_people
 
@@ -28,8 +28,6 @@ FORMAT, VERSION = "voodoo.people", 1
 """The version is increased if earlier readers would misread a message, not for additional keys."""
 PORT = 8765
 _OWN_PAGES = re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?")
-_LATE_S = 1.0
-"""A receiver that takes nothing for this long is named."""
 _BUFFER = 2**16
 """Bytes that wait for a receiver in the system: a second of one person; more would be old when it is read."""
 _CLOSE_S = 2.0
@@ -115,8 +113,8 @@ class WebSocketSink(Output):
             since, named = self._late.pop(connection, (now, False))
             transport = connection.transport
             if transport.get_write_buffer_size():
-                if not named and now - since > _LATE_S:
-                    self._on_message(f"{self._who(connection)} takes nothing; it gets the newest pose when it does")
+                if not named and now - since > LATE_S:
+                    self._on_message(f"{self._who(connection)} {HANGS}")
                     named = True
                 self._late[connection] = since, named
                 continue

@@ -18,6 +18,7 @@ from voodoo.live.mailbox import Mailbox
 from voodoo.live.source import Arrival, Faults, Source, SourceGone
 from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.model.camera import Camera
+from voodoo.model.rotations import nearest_rotations
 from voodoo.model.transforms import pose_of
 from voodoo.recordings.camera_files import read_calibration
 from voodoo.recordings.pictures import decode_color
@@ -201,5 +202,4 @@ def camera_of(
 
 def rigid(turn: npt.ArrayLike, place: npt.ArrayLike) -> FloatArray:
     """(4, 4) of a rotation (3, 3) in single precision, which is no rotation for the tracker, and a translation [m]."""
-    u, _, v = np.linalg.svd(np.asarray(turn, dtype=np.float64).reshape(3, 3))
-    return pose_of(u @ v, np.asarray(place, dtype=np.float64))
+    return pose_of(nearest_rotations(np.asarray(turn, dtype=np.float64).reshape(3, 3)), place)

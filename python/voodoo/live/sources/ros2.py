@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from voodoo.errors import VoodooError
+from voodoo.export.ros2 import TF
 from voodoo.live.clock import Clock, HostClock
 from voodoo.live.ros2.dds import Node, Offer, Subscription
-from voodoo.live.ros2.feed import TF, RosFeed
+from voodoo.live.ros2.feed import RosFeed
 from voodoo.live.source import Arrival, Faults, Source, SourceGone
 from voodoo.recordings.camera_files import read_calibration
 from voodoo.recordings.ros_topics import CAMERA_INFO, IMAGES, MEASURED, checked_numbers, info_topic

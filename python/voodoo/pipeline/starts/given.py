@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from voodoo.export.track import Track
-from voodoo.measurements import ROUNDED_S
+from voodoo.measurements import ROUNDED_S, nearest_stamp, usual_interval
 from voodoo.pipeline.starts.base import FoundStart, StartFinder, StartFrame, fixes_pose
 
 _SAME_TIME_S = 0.02
@@ -51,17 +51,14 @@ class EarlierStart(StartFinder):
 
     def __init__(self, result: Track) -> None:
         """Keep the reliable frames."""
-        steps = np.diff(result.stamps)
-        self._near = min(_SAME_TIME_S, 0.5 * float(np.median(steps))) if len(steps) else _SAME_TIME_S
+        self._near = min(_SAME_TIME_S, 0.5 * usual_interval(result.stamps))
         self._result = result.of_frames(np.array([word in _USABLE for word in result.status], dtype=bool))
 
     def find(self, frame: StartFrame) -> Sequence[FoundStart]:
         """See StartFinder."""
         result = self._result
-        if not len(result):
-            return []
-        row = int(np.argmin(np.abs(result.stamps - frame.stamp)))
-        if abs(result.stamps[row] - frame.stamp) > self._near:
+        row = nearest_stamp(result.stamps, frame.stamp, within=self._near) if len(result) else -1
+        if row < 0:
             return []
         pairs = zip(result.joint_names, result.joints[row], strict=True)
         joints = {name: position for name, position in pairs if name in frame.body.site_names}

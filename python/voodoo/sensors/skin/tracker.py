@@ -6,7 +6,6 @@ from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 
 import numpy as np
-import numpy.typing as npt
 
 import voodoo._core as _core
 from voodoo._core import Estimate
@@ -16,10 +15,9 @@ from voodoo.model.camera import Camera
 from voodoo.model.transforms import rigid
 from voodoo.people import Followed
 from voodoo.sensors.rays import SiteRay
+from voodoo.sensors.silhouettes.masks import Mask
 from voodoo.sensors.skin.settings import SkinSettings
 from voodoo.tracker import Tracker
-
-Mask = npt.NDArray[np.bool_]
 
 _NOWHERE = np.full(3, np.nan)
 
