@@ -203,6 +203,20 @@ for line in sys.stdin:
     assert fingerprint.run_all(build, cases, {}, tmp_path, 1) == {"ends": "the process ended"}
 
 
+def test_fingerprint_knows_the_helpers_and_data_of_its_cases(tmp_path):
+    fingerprint = load("fingerprint")
+    build = object.__new__(fingerprint.Build)
+    build.folder, build.package = tmp_path, tmp_path / "site-packages" / "voodoo"
+    digests = [build.digest()]
+    for name in ("tests/disturbance.py", "benches/in_memory.py", "site-packages/voodoo/data/truth.csv"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("1")
+        digests.append(build.digest())
+    assert len(set(digests)) == 4
+    (tmp_path / "tests" / "disturbance.pyc").write_text("1")
+    assert build.digest() == digests[-1]
+
+
 def test_fingerprint_lists_every_kind_of_case():
     done = subprocess.run([SCRIPTS / "fingerprint", "--list"], capture_output=True, text=True, check=True)
     names = done.stdout.splitlines()
