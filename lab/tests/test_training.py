@@ -34,6 +34,14 @@ def store(scenes, tmp_path_factory):
     return Store(folder, "train")
 
 
+def test_files_made_by_other_options_are_not_taken_for_these(tmp_path):
+    path, options = tmp_path / "train_1.json", {"pictures a process": 10, "others": 0.5, "groups": ["child"]}
+    data.agree(path, options)
+    data.agree(path, options)
+    with pytest.raises(SystemExit, match=r"found .*'others': 0\.5"):
+        data.agree(path, options | {"others": 0.0})
+
+
 def test_pictures_show_people_as_often_as_scenes_do(store):
     assert 0.45 < len(store.people) / (len(store.people) + len(store.others)) < 0.85
 
