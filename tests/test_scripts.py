@@ -123,10 +123,12 @@ def test_constants_counts_names_literals_and_keys_of_every_crate_and_of_python(t
     assert re.search(r"^all +10 +16 +6 +4 +26$", lines, re.MULTILINE)
 
 
-def test_constants_reports_what_has_no_comment_or_two_homes_in_a_crate(tree):
+def test_constants_reports_what_has_no_comment_or_two_homes_in_a_crate(tree, monkeypatch):
+    monkeypatch.setattr(constants, "LEFT_OUT", ("voodoo-core/math/", "voodoo-core/gone.rs"))
     assert constants.problems(tree) == [
         "voodoo-core/hypotheses/mod.rs:7: BARE has no doc comment with its unit and reason",
         "IDLE is defined in voodoo-core/hypotheses/mod.rs, voodoo-core/sizes.rs",
+        "voodoo-core/gone.rs is not there",
     ]
 
 
