@@ -18,7 +18,7 @@ fn uniform(state: &mut u64) -> f64 {
     ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// Points within 3 cm of the side, world frame.
+/// Points from 2 cm inside to 4 cm outside of the side, world frame.
 fn points_near(shape: &TaperedEllipticCylinder, world_from_limb: &Pose) -> Points {
     let mut state = 7;
     let mut points = Points::default();

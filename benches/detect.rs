@@ -1,6 +1,6 @@
 //! Cost of a look for a person: from depth image to candidate and joints, and of reading the network's weights.
 //!
-//! `cargo bench --bench detect`. The default human, 1.75 m, stands before a wall with a board beside it, on one thread.
+//! `cargo bench --bench detect`. The human of eighteen limbs (`HumanModel::Full`), 1.75 m, stands before a wall with a board beside it, on one thread.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a bench stops at the first surprise")]
 
 use std::hint::black_box;

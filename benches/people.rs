@@ -1,6 +1,7 @@
 //! Cost of a frame with several persons: 320x240, a wall behind them, everybody found by the detector.
 //!
-//! `cargo bench --bench people`. Default humans of 18 limbs, who sway beside each other; the detector is included.
+//! `cargo bench --bench people`. Humans of 18 limbs (`HumanModel::Full`), who sway beside each other; the detector
+//! is included.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a bench stops at the first surprise")]
 
 use std::hint::black_box;

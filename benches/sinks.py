@@ -125,11 +125,10 @@ def session(recording: MadeUpRecording, outputs: Sequence[Output], told: list[st
     return made
 
 
-def cost(recording: MadeUpRecording, rounds: int) -> None:
-    """Print the time of a frame without sinks and with all."""
+def cost(recording: MadeUpRecording, rounds: int, receivers: list[subprocess.Popen[bytes]]) -> None:
+    """Print the time of a frame without sinks and with all; the receivers that it starts, which never end, are added."""
     last = {(os.cpu_count() or 1) - 1}
     os.environ |= {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_DOMAIN_ID": "94"}
-    receivers: list[subprocess.Popen[bytes]] = []
 
     def receive(code: str, *words: str) -> None:
         command = [sys.executable, "-c", code, *words]
@@ -160,6 +159,9 @@ def cost(recording: MadeUpRecording, rounds: int) -> None:
             print(f"{len(made.persons())} people; {dropped} frames dropped: left out")
             continue
         used[on].append(1e3 * np.diff(recording.used)[len(recording.used) // 3 :])  # everybody is found
+    for on, side in ((False, "without sinks"), (True, "with all sinks")):
+        if not used[on]:
+            raise SystemExit(f"{side}: expected a session that finds four people and drops no frame, found none")
     without, with_all = (np.min(used[on], axis=0) for on in (False, True))
     more = with_all - without
     print(
@@ -169,8 +171,6 @@ def cost(recording: MadeUpRecording, rounds: int) -> None:
     for name, of in (("lower quartile", 25), ("median", 50)):
         low, high = (np.percentile([each.mean() for each in used[on]], of) for on in (False, True))
         print(f"{name} of whole sessions: {low:.2f} and {high:.2f} ms, {100.0 * (high / low - 1.0):+.1f} %")
-    for receiver in receivers:
-        receiver.kill()
 
 
 def collected() -> None:
@@ -214,7 +214,12 @@ def main() -> None:
     recording = four_people(arguments.seconds)
     collected()
     lateness(recording, min(arguments.rounds, 5))
-    cost(recording, arguments.rounds)
+    receivers: list[subprocess.Popen[bytes]] = []
+    try:
+        cost(recording, arguments.rounds, receivers)
+    finally:
+        for receiver in receivers:
+            receiver.kill()
 
 
 if __name__ == "__main__":

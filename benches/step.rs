@@ -1,8 +1,9 @@
 //! Cost of a frame: against the number of points (K07 figure 8), of ICP steps (figure 9), the weights, and from image to pose.
 //!
-//! `cargo bench --bench step`. Synthetic points of the default human, 1.75 m, ten limbs, which moves to and fro, so that
-//! no frame is at its optimum; the published solver unless another is named; all boxes and weights are the defaults.
-//! Images also of the default human of eighteen limbs.
+//! `cargo bench --bench step`. Synthetic points of the human of ten limbs (`HumanModel::Papers`), 1.75 m, which moves
+//! to and fro, so that no frame is at its optimum; the published solver unless another is named; all boxes and weights are
+//! the defaults.
+//! Images also of that of eighteen limbs (`HumanModel::Full`).
 #![allow(missing_docs, clippy::unwrap_used, reason = "a bench stops at the first surprise")]
 
 use std::hint::black_box;

@@ -123,10 +123,12 @@ def test_constants_counts_names_literals_and_keys_of_every_crate_and_of_python(t
     assert re.search(r"^all +10 +16 +6 +4 +26$", lines, re.MULTILINE)
 
 
-def test_constants_reports_what_has_no_comment_or_two_homes_in_a_crate(tree):
+def test_constants_reports_what_has_no_comment_or_two_homes_in_a_crate(tree, monkeypatch):
+    monkeypatch.setattr(constants, "LEFT_OUT", ("voodoo-core/math/", "voodoo-core/gone.rs"))
     assert constants.problems(tree) == [
         "voodoo-core/hypotheses/mod.rs:7: BARE has no doc comment with its unit and reason",
         "IDLE is defined in voodoo-core/hypotheses/mod.rs, voodoo-core/sizes.rs",
+        "voodoo-core/gone.rs is not there",
     ]
 
 
@@ -201,6 +203,20 @@ for line in sys.stdin:
     build.kept, build.result = (lambda _: False), (lambda case, _: tmp_path / case.name)
     cases = [fingerprint.Case(name, "command", (name,)) for name in ("first", "ends", "next", "last")]
     assert fingerprint.run_all(build, cases, {}, tmp_path, 1) == {"ends": "the process ended"}
+
+
+def test_fingerprint_knows_the_helpers_and_data_of_its_cases(tmp_path):
+    fingerprint = load("fingerprint")
+    build = object.__new__(fingerprint.Build)
+    build.folder, build.package = tmp_path, tmp_path / "site-packages" / "voodoo"
+    digests = [build.digest()]
+    for name in ("tests/disturbance.py", "benches/in_memory.py", "site-packages/voodoo/data/truth.csv"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("1")
+        digests.append(build.digest())
+    assert len(set(digests)) == 4
+    (tmp_path / "tests" / "disturbance.pyc").write_text("1")
+    assert build.digest() == digests[-1]
 
 
 def test_fingerprint_lists_every_kind_of_case():

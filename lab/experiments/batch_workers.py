@@ -53,24 +53,35 @@ def children(pid: int) -> Iterator[tuple[int, str]]:
                 yield from children(int(entry.name))
 
 
-def kill_a_worker(pid: int) -> int:
-    """Kill one of the processes that track, a child of the command by multiprocessing; its number."""
-    workers = [child for child, words in children(pid) if "spawn_main" in words]
-    os.kill(workers[0], signal.SIGKILL)
-    return workers[0]
+def kill_a_worker(pid: int) -> int | None:
+    """Kill one of the processes that track, a child of the command by multiprocessing; its number, None: there is none yet."""
+    worker = next((child for child, words in children(pid) if "spawn_main" in words), None)
+    if worker is not None:
+        os.kill(worker, signal.SIGKILL)
+    return worker
 
 
 def timed(recordings: Path, out: Path, workers: int, *, kill_after: int | None = None) -> float:
     """Wall-clock time of the command [s]."""
     began = time.perf_counter()
     running = batch(recordings, out, workers)
-    while running.poll() is None:
-        if kill_after is not None and len(done_in(out)) >= kill_after:
-            print(f"killed worker {kill_a_worker(running.pid)} after {len(done_in(out))} recordings", flush=True)
-            kill_after = None
-        time.sleep(0.05)
+    try:
+        while running.poll() is None:
+            if (
+                kill_after is not None
+                and len(done := done_in(out)) >= kill_after
+                and (worker := kill_a_worker(running.pid))
+            ):
+                print(f"killed worker {worker} after {len(done)} recordings", flush=True)
+                kill_after = None
+            time.sleep(0.05)
+    finally:
+        running.terminate()
+        running.wait()
     if running.returncode:
         sys.exit(f"voodoo batch ended with exit code {running.returncode}")
+    if kill_after is not None:
+        sys.exit("expected to kill a worker, found that the batch had ended")
     return time.perf_counter() - began
 
 

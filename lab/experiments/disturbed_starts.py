@@ -5,7 +5,8 @@
 The first run starts from init.json, the others with 4 mm of noise on its joints. Prints mean error, class (K06 Table I made
 automatic) and the joints that are still lost at the end, run by run; how many of the limbs that were off by 10 cm, and of the
 others, were not called measured; and how errors compare with their standard deviations. Against a reference skeleton, which
-leads the depth by some frames, errors are at the recording's best lag and 15 cm count as lost, as in `voodoo eval`.
+leads the depth by some frames, errors are at the recording's best lag, without its implausible joints, and 15 cm count as lost,
+as in `voodoo eval`. A joint is lost at the end if it is in the last frame in which the truth knows it.
 
 `--backwards` plays the recordings from their end, starting from the true joints there, and `--every 2` leaves out every second
 frame: other motions of the same people.
@@ -21,7 +22,7 @@ import numpy as np
 import voodoo
 from voodoo.evaluation import metrics
 from voodoo.evaluation.calibration import Deviations, calibrate, calibration_markdown, sigma_of
-from voodoo.evaluation.evaluate import called_measured, compare, differences, limb_ends
+from voodoo.evaluation.evaluate import called_measured, limb_ends, reference_positions
 from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M
 from voodoo.export.track import Track
 from voodoo.pipeline.run import track
@@ -86,16 +87,22 @@ def run(
     settings = FrontEndSettings.of(recording, use=("depth",))
     estimates = [step.estimate for step in track(recording, tracker, settings=settings)]
     result = Track.of(estimates, body=tracker.body)
-    errors = compare(recording, result, at_best_lag=not reference.exact)
-    off = differences(recording, result, at_best_lag=not reference.exact)
+    positions = metrics.places_of(result.joint_names, result.joints)
+    places, lag = reference_positions(recording, result.stamps), 0
+    if not reference.exact:
+        places = metrics.without_contradictions(places)
+        lag = metrics.best_lag(positions, places)
+    off = positions - metrics.shifted(places, lag)
+    errors = np.linalg.norm(off, axis=2)
     limit = LIMIT_EXACT_M if reference.exact else LIMIT_REFERENCE_M
     kind, lost = metrics.tracking_class(errors, result.stamps, limit=limit)
     measured = np.array([called_measured(estimate) for estimate in estimates])
+    known_lost = [gone[there] for gone, there in zip(lost.T, np.isfinite(errors).T, strict=True)]
     groups = [limb_ends(errors, far=far) for far in (True, False)]
     return (
         metrics.mean_or_nan(errors),
         kind,
-        [name for name, gone in zip(metrics.JOINTS, lost[-1], strict=True) if gone],
+        [name for name, gone in zip(metrics.JOINTS, known_lost, strict=True) if gone[-1:].any()],
         [(int((group & ~measured).sum()), int(group.sum())) for group in groups],
         Deviations(off, np.array([sigma_of(estimate) for estimate in estimates]), measured),
     )

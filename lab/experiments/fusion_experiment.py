@@ -92,7 +92,7 @@ def track(
     joints = {name: np.add(place, chance.normal(0.0, noise, 3)) for name, place in recording.start["joints"].items()}
     if mode == "again":
         joints = {name: np.add(place, chance.normal(0.0, AGAIN_M, 3)) for name, place in joints.items()}
-    # The papers' solver with the papers' ten limbs, any other with the default human.
+    # The papers' solver with the papers' ten limbs, any other with the eighteen of `full`.
     model = "papers" if solver == "limbwise" else "full"
     body = voodoo.Body.human(height=recording.start["height_m"], model=model)
     tracker = voodoo.Tracker(body, config=voodoo.Config(solver=solver))

@@ -3,8 +3,8 @@
     python lab/experiments/fusion_pose2sim.py ../shared/data/pose2sim --out out/pose2sim
 
 Writes table.md, errors.png (error over time) and skeletons.png (the pose drawn into the cameras' pictures). The body
-is the ten-limb one, because the keypoints say nothing about waist and neck (`--model full`: the sixteen limbs of the command
-line); the tracker's parameters are the defaults. The column "triangulated" is the mean distance of the same rays' common points,
+is the ten-limb one, because the keypoints say nothing about waist and neck (`--model full`: that of eighteen limbs); the
+tracker's parameters are the defaults. The column "triangulated" is the mean distance of the same rays' common points,
 each joint alone, where rays farther than 25 cm from the reference are left out: what this data can give without a body.
 """
 

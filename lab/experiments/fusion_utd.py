@@ -38,7 +38,7 @@ def run(path: Path, *, rays: bool, solver: str) -> dict[str, float]:
     """Mean error [m] of each group."""
     recording = open_recording(path)
     reference = recording.reference
-    # The papers' solver with the papers' ten limbs, any other with the default human.
+    # The papers' solver with the papers' ten limbs, any other with the eighteen of `full`.
     body = voodoo.Body.human(model="papers" if solver == "limbwise" else "full")
     tracker = voodoo.Tracker(body, config=voodoo.Config(solver=solver))
     tracker.reset(joints=recording.start["joints"], fit_sizes=True)

@@ -4,7 +4,7 @@
 
 Every second frame by itself: arms and legs at the truth, then turned about the line between their known ends in steps of 5
 degrees. Where the image criterion is no more than 0.1 px above that of the truth, and no joint limit is broken, nothing speaks
-against a turn.
+against a turn. Frames in which the truth itself breaks one are left out.
 The number is the mean distance of these places from the one that is nearest to all of them, the best guess: of all, and of those
 that hang together with the truth, which is what is left to someone who knows where the joint was before.
 """
@@ -58,7 +58,8 @@ def left_open(sequence: Rendered, views: int) -> dict[str, np.ndarray]:
                 cost = chain.criterion(turn, images, world_from_base=base, others=others)[0]
                 costs.append(cost if allowed else np.inf)
                 places.append(place)
-            found[joint].append(scatter(np.array(places), np.array(costs) <= costs[0] + CONTENT_PX))
+            if np.isfinite(costs[0]):  # where the truth itself is not allowed, there is nothing to compare with
+                found[joint].append(scatter(np.array(places), np.array(costs) <= costs[0] + CONTENT_PX))
     return {joint: np.array(values) for joint, values in found.items()}
 
 

@@ -211,12 +211,14 @@ def main() -> None:
             "\n| real cameras, known and error from | joint | plain | best 1 | best 2 | those that agree | all 4 | best turn |\n"
             "|---|---|---|---|---|---|---|---|"
         )
+        solved = {}
         for name, truth, options in (
             ("the triangulation", trial.truth, {}),
             ("its nearest chains", trial.steady, {}),
             ("the same, at rest", trial.steady, {"rest": "mean"}),
         ):
             found = [*(trial.solve(cameras, truth, **options) for cameras in sets), nearest(truth)]
+            solved[name] = found
             for joint in LIMBS:
                 means = [1e3 * errors(one, truth)[joint].mean() for one in found]
                 print(f"| {name} | {joint} | " + " | ".join(f"{mean:.1f}" for mean in means) + " |")
@@ -225,7 +227,7 @@ def main() -> None:
         all_sets(trial)
         moved = {name: np.linalg.norm(trial.steady[name] - trial.truth[name], axis=1) for name in trial.truth}
         print("\nmoved, mean mm: " + ", ".join(f"{n} {1e3 * d.mean():.1f}" for n, d in moved.items() if d.any()))
-        frame = 50
+        frame, found = 50, solved["its nearest chains"]
         then = [{joint: places[joint][frame] for joint in LIMBS} for places in (trial.steady, found[0], found[3])]
         known = {site: places[frame] for site, places in trial.steady.items()}
         views = [picture(view[frame], pose, known, then) for view, pose in trial.views.values()]

@@ -113,17 +113,24 @@ def ros2(command: list[str], words: list[str], rate: float, seconds: float) -> d
     here = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_DOMAIN_ID": "93"}
     code = "import sys; from voodoo.cli import main; sys.argv[0] = 'voodoo'; main()"
     words = ["live", "ros2:/camera/depth/image_raw", *words, "--report", str(report)]
-    ours = subprocess.Popen([sys.executable, "-c", code, *words], env=here)
-    time.sleep(4.0)
     options = {"--rate": rate, "--count": round(rate * seconds)}
-    command += [str(images), *(str(word) for option in options.items() for word in option)]
-    theirs = subprocess.Popen(command, env=here, stdout=subprocess.PIPE, text=True)
-    time.sleep(min(60.0, seconds / 2))
-    settled = memory_mb(ours.pid)
-    answer = json.loads(theirs.communicate()[0])
-    ended = memory_mb(ours.pid)
-    ours.terminate()
-    ours.wait()
+    command = [*command, str(images), *(str(word) for option in options.items() for word in option)]
+    running = [subprocess.Popen([sys.executable, "-c", code, *words], env=here)]
+    try:
+        time.sleep(4.0)
+        running.append(subprocess.Popen(command, env=here, stdout=subprocess.PIPE, text=True))
+        ours, theirs = running
+        time.sleep(min(60.0, seconds / 2))
+        settled = memory_mb(ours.pid)
+        printed = theirs.communicate()[0]
+        if theirs.returncode:
+            raise SystemExit(f"{command[0]}: expected to end with 0, found {theirs.returncode}")
+        ended = memory_mb(ours.pid)
+    finally:
+        for process in running:
+            process.terminate()
+            process.wait()
+    answer = json.loads(printed)
     latency = 1e3 * np.array([seconds for _, seconds in answer["states"]])
     tenth = max(len(latency) // 10, 1)
     return displayed(json.loads(report.read_text(encoding="utf-8"))) | {

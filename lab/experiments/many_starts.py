@@ -4,7 +4,8 @@
     python -m lab.training.unseen OUT && python lab/experiments/many_starts.py OUT/report/*
 
 Every recording is tracked for 1.5 s from every 0.4 s of it. Prints how many starts there are, the mean error of the first pose,
-mean and median of the mean errors after each start, and the share of starts with a mean error beyond 10 cm.
+mean and median of the mean errors after each start, the share of starts with a mean error beyond 10 cm, and how many starts had
+too few tracked frames, which are in none of these.
 """
 
 import argparse
@@ -23,12 +24,12 @@ from voodoo.sensors.settings import FrontEndSettings
 EVERY_S, TRACKED_S, LEFT_S = 0.4, 1.5, 1.0
 """Time between starts, time tracked after each, and least time left in the recording at the last one."""
 ENOUGH = 10
-"""Starts with fewer tracked frames are left out."""
+"""Starts with no more tracked frames than this are left out."""
 FAR_M = 0.1
 
 
 def errors_of(path: Path) -> list[tuple[float, float]]:
-    """Mean error of the first pose and of all poses after each start, meters."""
+    """Mean error of the first pose and of all poses after each start, meters; NaN with too few."""
     recording = voodoo.open_recording(path)
     reference = recording.reference
     if reference is None or not reference.exact:
@@ -47,8 +48,7 @@ def errors_of(path: Path) -> list[tuple[float, float]]:
                 truth = reference.positions[np.argmin(np.abs(reference.stamps - estimate.stamp))][column]
                 places = np.array([estimate.joints[name] for name in metrics.JOINTS])
                 errors.append(float(np.linalg.norm(places - truth, axis=1).mean()))
-        if len(errors) > ENOUGH:
-            found.append((errors[0], float(np.mean(errors))))
+        found.append((errors[0], float(np.mean(errors))) if len(errors) > ENOUGH else (np.nan, np.nan))
     return found
 
 
@@ -59,10 +59,14 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
     with ProcessPoolExecutor(options.jobs) as pool:
-        first, mean = np.array([each for part in pool.map(errors_of, options.recordings) for each in part]).T
+        found = np.array([each for part in pool.map(errors_of, options.recordings) for each in part]).reshape(-1, 2)
+    first, mean = found[np.isfinite(found[:, 1])].T
+    few = f"{len(found) - len(mean)} starts with at most {ENOUGH} tracked frames"
+    if not len(mean):
+        raise SystemExit(f"expected starts with a pose, found {few}")
     print(
         f"{len(mean)} starts: first pose {100 * first.mean():.2f} cm, mean {100 * mean.mean():.2f} cm, "
-        f"median {100 * np.median(mean):.2f} cm, {100 * (mean > FAR_M).mean():.1f} % beyond 10 cm"
+        f"median {100 * np.median(mean):.2f} cm, {100 * (mean > FAR_M).mean():.1f} % beyond 10 cm; left out: {few}"
     )
 
 

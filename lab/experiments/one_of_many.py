@@ -6,8 +6,8 @@ Depth alone, without a first pose. The first table has a row for every stretch o
 something else is followed; a person is followed while the tracked root is within 0.5 m of theirs. The second has a row for
 every stretch in which a person is in view, by 80 % of their pixels at some time: how long after that the first pose of them
 comes (before it where less of them was enough), the share of the frames they are followed in, how it was while they sat, and
-how long after they left the tracker says that nobody is there. A person who comes while another one is followed is not
-followed: one body is tracked.
+how long after they left nobody or another person is followed: a body that is left behind belongs to no person. A person who
+comes while another one is followed is not followed: one body is tracked.
 """
 
 import argparse
@@ -169,12 +169,11 @@ def visits(result: Followed) -> list[str]:
                 wait, error = f"{times[first] - times[begins]:+.2f} s ({first - begins:+d})", cm(result.errors[[first]])
             sat = seated[part]
             sitting = f"{100.0 * mine[sat].mean():.0f} %, {cm(result.errors[part][mine & sat])} cm" if sat.any() else ""
-            after = np.flatnonzero(result.who[part.stop :] != number)
-            stayed = (
-                f"{times[part.stop + after[0]] - times[part.stop]:.1f} s"
-                if mine[-1] and part.stop < len(times) and len(after)
-                else ""
-            )
+            stayed = ""
+            if mine[-1] and part.stop < len(times):
+                gone = np.flatnonzero(~np.isin(result.who[part.stop :], (number, ELSE)))
+                end = part.stop + int(gone[0]) if len(gone) else len(times) - 1
+                stayed = f"{'' if len(gone) else 'over '}{times[end] - times[part.stop]:.1f} s"
             span = f"{number}: {times[part][0]:.1f} to {times[part][-1]:.1f}"
             rows.append(f"| {span} | {wait} | {error} | {100.0 * mine.mean():.0f} % | {sitting} | {stayed} |")
     return rows

@@ -69,7 +69,7 @@ class Followed:
 
     @property
     def angle_jitter(self) -> float:
-        """Mean variance of the angles' second difference [degrees squared], less the truth's where it is known."""
+        """Mean variance of the angles' second difference [degrees squared]."""
         return float(np.mean(np.var(np.degrees(np.diff(np.unwrap(self.angles, axis=0), n=2, axis=0)), axis=0)))
 
 

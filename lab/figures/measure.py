@@ -1,7 +1,8 @@
-"""Measure figures again: `python -m lab.figures.measure [ID ...] [--data D] [--jobs 2]`.
+"""Measure figures again: `python -m lab.figures.measure [ID ...] --machine NAME [--data D] [--jobs 2]`.
 
 Runs the commands of runs of runs.json (by default of all whose output is read here) with this build, and writes the values, the
-commit and the date. Runs that share a command share its output. What takes a quiet machine (times) or training is not here.
+machine (a key of `machines` in runs.json), the commit and the date. Nothing that git tracks may have changes, but for runs.json.
+Runs that share a command share its output. What takes a quiet machine (times) or training is not here.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import shlex
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,12 +28,23 @@ COVERED_CM = 7
 ANYBODY = {"child": "ab_d1", "wheelchair": "ab_d2", "desk": "ab_d3", "skirt": "ab_d4", "heavy": "ab_d5"}
 
 
+SHOWN: dict[str, tuple[str, int, int | None]] = {
+    "mean_cm": ("error_m", 100, 1), "within_10cm": ("within_10cm", 100, 1), "lost": ("class_0", 1, None),
+    "sequences": ("sequences", 1, None), "recordings": ("sequences", 1, None), "tracking_class": ("class_average", 1, 2),
+    "first_cm": ("first_pose_error_m", 100, 1), "recall": ("lost_recall_together", 100, None),
+    "false_alarm": ("false_alarm_rate_together", 100, 1), "offsets_cm": ("error_without_offsets_m", 100, 1),
+    "offsets_class": ("class_without_offsets", 1, 2), "left_out": ("left_out_share", 100, 1),
+}  # fmt: skip
+"""Values of a summary.csv: its column, a factor, and digits (None: an integer)."""
+
+
 @dataclass(frozen=True)
 class Output:
-    """What a command printed, and the first row of the summary.csv that it wrote, if it did."""
+    """What a command printed, the first row of the summary.csv that it wrote, and all of its people.csv, if it did."""
 
     text: str
     summary: Mapping[str, str] = field(default_factory=dict)
+    people: Sequence[Mapping[str, str]] = ()
 
     @property
     def rows(self) -> list[list[str]]:
@@ -75,18 +87,12 @@ def number(text: str) -> float:
 
 
 def evaluated(output: Output) -> dict[str, float]:
-    """All that the runs show of `voodoo eval`."""
+    """All that the runs show of `voodoo eval`, without what is not known."""
     of = {name: float(value) for name, value in output.summary.items() if name != "kind" and value}
-    return {
-        "mean_cm": round(100 * of["error_m"], 1), "within_10cm": round(100 * of["within_10cm"], 1),
-        "lost": round(of["class_0"]), "sequences": round(of["sequences"]), "recordings": round(of["sequences"]),
-        "tracking_class": round(of["class_average"], 2), "first_cm": round(100 * of.get("first_pose_error_m", 0.0), 1),
-        "recall": round(100 * of["lost_recall_together"]), "false_alarm": round(100 * of["false_alarm_rate_together"], 1),
-        "offsets_cm": round(100 * of.get("error_without_offsets_m", 0.0), 1),
-        "offsets_class": round(of.get("class_without_offsets", 0.0), 2),
-        "offsets_lost": round(of.get("lost_without_offsets", 0.0) * of["sequences"]),
-        "left_out": round(100 * of.get("left_out_share", 0.0), 1),
-    }  # fmt: skip
+    found = {name: round(by * of[column], digits) for name, (column, by, digits) in SHOWN.items() if column in of}
+    if "lost_without_offsets" in of:
+        found["offsets_lost"] = round(of["lost_without_offsets"] * of["sequences"])
+    return found
 
 
 def disturbed(output: Output) -> dict[str, float]:
@@ -154,8 +160,8 @@ def people(output: Output) -> dict[str, float]:
     """All recordings of several persons."""
     heads, *_, last = output.rows
     names = {"mota": "MOTA", "idf1": "IDF1", "switches": "id switches", "mean_cm": "joint error, cm"}
-    names["false_bodies"] = "false bodies a minute"
-    return {value: number(last[heads.index(name)]) for value, name in names.items()}
+    false_bodies = sum(int(row["false_bodies"]) for row in output.people)
+    return {value: number(last[heads.index(name)]) for value, name in names.items()} | {"false_bodies": false_bodies}
 
 
 def empty_rooms(output: Output) -> dict[str, float]:
@@ -197,9 +203,15 @@ def real(output: Output) -> dict[str, float]:
 
 
 def first_poses(output: Output) -> dict[str, float]:
-    """The best and the worst recording."""
-    errors = [float(error) for error in re.findall(r"([\d.]+) cm off", output.text)]
-    return {"least_cm": min(errors), "most_cm": max(errors)}
+    """The best and the worst recording.
+
+    Raises:
+        ValueError: one of them has no first pose, or there is none.
+    """
+    errors = re.findall(r"([\d.]+) cm off$", output.text, re.MULTILINE)
+    if not errors or len(errors) != len(output.text.splitlines()):
+        raise ValueError(f"expected a first pose in every line, found:\n{output.text}")
+    return {"least_cm": min(map(float, errors)), "most_cm": max(map(float, errors))}
 
 
 READ: dict[str, Read] = {
@@ -230,8 +242,29 @@ def measured(command: str, data: Path) -> Output:
         done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
         if done.returncode:
             raise ValueError(f"{command}: expected to end with 0, found {done.returncode}:\n{done.stderr[-2000:]}")
-        summary = Path(folder, "summary.csv")
-        return Output(done.stdout, next(csv.DictReader(summary.open(encoding="utf-8"))) if summary.exists() else {})
+        summary, people = (rows_of(Path(folder, name)) for name in ("summary.csv", "people.csv"))
+        return Output(done.stdout, summary[0] if summary else {}, people)
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    """The rows of a table, none where there is no file."""
+    return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines())) if path.exists() else []
+
+
+def state(root: Path) -> tuple[str, str]:
+    """Commit and date of a checkout.
+
+    Raises:
+        SystemExit: files that git tracks have changes, other than runs.json.
+    """
+
+    def git(*words: str) -> str:
+        return subprocess.run(["git", *words], cwd=root, capture_output=True, text=True, check=True).stdout
+
+    if changes := git("status", "--porcelain", "--untracked-files=no", "--", ".", ":!lab/figures/runs.json"):
+        raise SystemExit(f"expected a tree without changes, found:\n{changes}")
+    commit, date = git("show", "-s", "--format=%h %as", "--abbrev=8", "HEAD").split()
+    return commit, date
 
 
 def expanded(pattern: str) -> list[str]:
@@ -245,6 +278,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("runs", nargs="*", metavar="ID", help=f"of {', '.join(READ)}")
     default = Path(os.environ.get("VOODOO_DATA", ROOT.parent / "shared" / "data"))
+    parser.add_argument("--machine", required=True, metavar="NAME", help="of `machines` in runs.json")
     parser.add_argument("--data", type=Path, default=default, help="folder of the measurement data")
     parser.add_argument("--jobs", type=int, default=1, help="commands at the same time")
     options = parser.parse_args()
@@ -252,19 +286,22 @@ def main() -> int:
         parser.error(f"expected runs of {sorted(READ)}, found {sorted(unknown)}")
     path = HERE / "runs.json"
     content = json.loads(path.read_text(encoding="utf-8"))
+    if options.machine not in content["machines"]:
+        parser.error(f"--machine: expected one of {sorted(content['machines'])}, found {options.machine!r}")
+    commit, date = state(ROOT)
     chosen = [run for run in content["runs"] if run["id"] in (options.runs or READ)]
     commands = list(dict.fromkeys(run["command"] for run in chosen))
     with ThreadPoolExecutor(options.jobs) as pool:
         printed = list(pool.map(measured, commands, [options.data.resolve()] * len(commands)))
     outputs = dict(zip(commands, printed, strict=True))
-    git = ["git", "show", "-s", "--format=%h %as", "--abbrev=8", "HEAD"]
-    commit, date = subprocess.run(git, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
-    for run in chosen:
-        found = READ[run["id"]](outputs[run["command"]])
+    read = {run["id"]: READ[run["id"]](outputs[run["command"]]) for run in chosen}
+    content = json.loads(path.read_text(encoding="utf-8"))  # it may have been edited meanwhile
+    for run in (run for run in content["runs"] if run["id"] in read):
+        found = read[run["id"]]
         for name, value in run["values"].items():
             print(f"{run['id']}.{name}: {value} -> {found.get(name, 'not in the output: check it')}")
             run["values"][name] = found.get(name, value)
-        run |= {"commit": commit, "date": date}
+        run |= {"commit": commit, "date": date, "machine": options.machine}
     path.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     return 0
 

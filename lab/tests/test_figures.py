@@ -1,7 +1,9 @@
 """The figures of the pages are those of lab/figures/runs.json."""
 
+import json
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -80,3 +82,73 @@ def test_values_are_read_from_what_the_commands_print():
         assert read(measure.Output(text)) == expected[name]
         with pytest.raises(ValueError, match="expected"):
             read(measure.Output(""))
+
+
+def test_what_an_evaluation_does_not_know_is_left_out():
+    summary = {"kind": "exact truth", "error_m": "0.0184", "class_0": "0.0", "sequences": "8", "first_pose_error_m": ""}
+    found = measure.evaluated(measure.Output("", summary))
+    assert found == {"mean_cm": 1.8, "lost": 0, "sequences": 8, "recordings": 8}
+    assert isinstance(found["lost"], int)
+
+
+def test_false_bodies_are_counted_not_those_a_minute():
+    head = "| recording | MOTA | IDF1 | id switches | false bodies a minute | joint error, cm |\n|---|---|---|---|---|---|\n"
+    rows = [{"false_bodies": "0"}, {"false_bodies": "3"}]
+    output = measure.Output(head + "| all | 1.000 | 0.990 | 1 | 4.5 | 2.5 |\n", {}, rows)
+    expected = {"mota": 1.0, "idf1": 0.99, "switches": 1, "mean_cm": 2.5, "false_bodies": 3}
+    assert measure.people(output) == expected and isinstance(measure.people(output)["false_bodies"], int)
+
+
+@pytest.mark.parametrize("failed", ["nobody found", "first pose in frame 0, nan cm off"])
+def test_a_start_that_fails_is_no_best_or_worst_one(failed):
+    good = "dev_01: first pose in frame 0, 3.1 cm off\ndev_02: first pose in frame 2, 4.0 cm off\n"
+    assert measure.first_poses(measure.Output(good)) == {"least_cm": 3.1, "most_cm": 4.0}
+    with pytest.raises(ValueError, match="expected a first pose in every line"):
+        measure.first_poses(measure.Output(f"{good}dev_03: {failed}\n"))
+
+
+def test_a_tree_with_changes_is_not_measured(tmp_path):
+    git = ["git", "-C", str(tmp_path), "-c", "user.name=a", "-c", "user.email=a@example.org"]
+    (tmp_path / "lab" / "figures").mkdir(parents=True)
+    for name in ("code.py", "lab/figures/runs.json"):
+        (tmp_path / name).write_text("1")
+    for words in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "all"]):
+        subprocess.run([*git, *words], check=True)
+    (tmp_path / "lab" / "figures" / "runs.json").write_text("2")
+    (tmp_path / "untracked").write_text("2")
+    commit, date = measure.state(tmp_path)
+    assert len(commit) == 8 and re.fullmatch(r"\d{4}-\d\d-\d\d", date)
+    (tmp_path / "code.py").write_text("2")
+    with pytest.raises(SystemExit, match=r"expected a tree without changes, found:\n M code\.py"):
+        measure.state(tmp_path)
+
+
+def test_what_is_edited_during_the_runs_stays_and_the_machine_is_written(monkeypatch, tmp_path):
+    path = tmp_path / "runs.json"
+    run = {
+        "id": "start-keypoints-depth",
+        "command": "c",
+        "commit": "",
+        "date": "",
+        "machine": "old",
+        "values": {"least_cm": 0.0},
+    }
+    path.write_text(json.dumps({"machines": {"old": "", "new": ""}, "runs": [run]}))
+
+    def measured(command, data):
+        path.write_text(path.read_text().replace('"old": ""', '"old": "edited"'))
+        return measure.Output("first pose in frame 0, 3.1 cm off")
+
+    monkeypatch.setattr(measure, "HERE", tmp_path)
+    monkeypatch.setattr(measure, "measured", measured)
+    monkeypatch.setattr(measure, "state", lambda root: ("12345678", "2026-12-01"))
+    monkeypatch.setattr(sys, "argv", ["measure", "start-keypoints-depth", "--machine", "new"])
+    assert measure.main() == 0
+    written = json.loads(path.read_text())
+    assert written["machines"]["old"] == "edited"
+    assert written["runs"] == [
+        run | {"commit": "12345678", "date": "2026-12-01", "machine": "new", "values": {"least_cm": 3.1}}
+    ]
+    monkeypatch.setattr(sys, "argv", ["measure", "--machine", "none"])
+    with pytest.raises(SystemExit):
+        measure.main()

@@ -54,7 +54,7 @@ def test_found_seated_gone_and_the_next_one_found(many):
     errors = np.where(who > 0, 0.05, np.nan)
     result = many.Followed(made(many), who, who == -1, errors)
     first, second = map(cells, many.visits(result))
-    assert first == ["1: 0.2 to 0.5", "+0.10 s (+1)", "5.0", "50 %", "100 %, 5.0 cm", "0.0 s"]
+    assert first == ["1: 0.2 to 0.5", "+0.10 s (+1)", "5.0", "50 %", "100 %, 5.0 cm", "0.1 s"]
     assert second == ["2: 0.7 to 0.9", "+0.20 s (+2)", "5.0", "33 %", "", ""]
     assert [cells(line)[:3] for line in many.timeline(result)] == [
         ["0.0 to 0.3", "nobody", ""],
@@ -63,6 +63,12 @@ def test_found_seated_gone_and_the_next_one_found(many):
         ["0.7 to 0.8", "nobody", ""],
         ["0.9 to 0.9", "person 2", "0 %"],
     ]
+
+
+def test_a_body_that_is_left_behind_stays_until_the_end(many):
+    who = np.array([0, 0, 0, 0, 1, 1, -1, -1, -1, -1])
+    first, _ = map(cells, many.visits(many.Followed(made(many), who, who == -1, np.where(who > 0, 0.05, np.nan))))
+    assert first[-1] == "over 0.3 s"
 
 
 def test_a_root_belongs_to_the_nearest_person_within_half_a_meter(many):

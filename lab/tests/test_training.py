@@ -8,7 +8,7 @@ import pytest
 torch = pytest.importorskip("torch", reason="the extra `training` is not installed")
 pytest.importorskip("numba", reason="the extra `training` is not installed")
 
-from lab.training import anybody, crops, data, export, train, unseen  # noqa: E402
+from lab.training import anybody, crops, data, evaluate, export, train, unseen  # noqa: E402
 from lab.training.bodies import JOINTS, Bodies  # noqa: E402
 from lab.training.loader import SWAP, Store, augment  # noqa: E402
 from lab.training.poses import load, standing  # noqa: E402
@@ -32,6 +32,14 @@ def store(scenes, tmp_path_factory):
         batch += crops.samples(scenes.frame(rng), rng)
     data.save(folder / "train_toy.npz", batch)
     return Store(folder, "train")
+
+
+def test_files_made_by_other_options_are_not_taken_for_these(tmp_path):
+    path, options = tmp_path / "train_1.json", {"pictures a process": 10, "others": 0.5, "groups": ["child"]}
+    data.agree(path, options)
+    data.agree(path, options)
+    with pytest.raises(SystemExit, match=r"found .*'others': 0\.5"):
+        data.agree(path, options | {"others": 0.0})
 
 
 def test_pictures_show_people_as_often_as_scenes_do(store):
@@ -97,6 +105,22 @@ def test_places_in_the_picture_come_back(store):
     points = np.random.default_rng(0).normal([0, 0, 3.0], 0.4, (len(middle), 17, 3))
     places = np.stack([crops.place(p, m, 0.0) for p, m in zip(points, middle, strict=True)])
     np.testing.assert_allclose(crops.lifted(places, middle), points, atol=1e-6)
+
+
+def test_a_joint_without_a_truth_is_no_hidden_one():
+    """Errors of 1 m where the weight is 0, of 0.1 m where it is that of a hidden joint."""
+    weight = np.ones((2, 17))
+    weight[0, 9], weight[0, 10] = 0.4, 0.0
+    joints = np.zeros((2, 17, 3))
+    true = {"person": np.ones(2), "weight": weight, "joints": joints, "middle": np.tile([0.0, 0.0, 3.0], (2, 1)),
+            "facing": np.ones(2), "lengths": np.ones((2, 9))}  # fmt: skip
+    off = joints.copy()
+    off[0, 9, 2], off[0, 10, 2] = 0.1, 1.0
+    reported = {"joints": off, "facing": np.ones(2), "person": np.ones(2), "length": np.zeros((2, 9)),
+                "length_scale": np.zeros((2, 9)), "scale": np.zeros((2, 17))}  # fmt: skip
+    found = evaluate.measure(reported, true)
+    assert found["hidden_cm"] == pytest.approx(10.0) and found["mean_cm"] == 0.0
+    assert found["hidden_within_scale"]["mean"] == pytest.approx(0.1 / 3)
 
 
 def test_a_toy_learns_and_its_weights_come_back(store, tmp_path):

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import json
 import multiprocessing
 import os
 import time
 from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -30,6 +32,17 @@ def save(path: Path, batch: list[Sample]) -> None:
     part = path.with_suffix(".part.npz")
     np.savez(part, **columns)
     part.rename(path)
+
+
+def agree(path: Path, options: dict[str, Any]) -> None:
+    """Write by which options files are made, which are kept when the command is given again.
+
+    Raises:
+        SystemExit: they were made by others.
+    """
+    if path.exists() and (found := json.loads(path.read_text(encoding="utf-8"))) != options:
+        raise SystemExit(f"{path}: expected {options}, found {found}: choose another --out or --seed")
+    path.write_text(json.dumps(options) + "\n", encoding="utf-8")
 
 
 def make(
@@ -69,6 +82,8 @@ def main() -> None:
     a = parser.parse_args()
     a.out.mkdir(parents=True, exist_ok=True)
     fraction = -(-a.count // a.processes)
+    made_by = {"pictures a process": fraction, "others": a.others, "groups": list(a.group)}
+    agree(a.out / f"{'held' if a.held_out else 'train'}_{a.seed}.json", made_by)
     workers = []
     for i in range(a.processes):
         options = {"seed": a.seed, "worker": i, "count": fraction, "held_out": a.held_out, "others": a.others}

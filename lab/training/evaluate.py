@@ -66,7 +66,8 @@ def _bones(points: Array) -> dict[str, Array]:
 def measure(reported: dict[str, Array], true: dict[str, Array]) -> dict[str, Any]:
     """Errors of joints (cm), exchanges, sizes, calibration, and how persons are told from other things."""
     people = true["person"] > 0.5
-    use = true["weight"][people] > 0.9
+    weight = true["weight"][people]
+    use, hidden = weight > 0.9, (weight > 0) & (weight < 0.5)  # 0: the truth is beyond what a picture holds
     want, got = (lifted(x[people], true["middle"][people]) for x in (true["joints"], reported["joints"]))
     error = np.linalg.norm(got - want, axis=-1)
     whole = use.all(1)
@@ -80,7 +81,7 @@ def measure(reported: dict[str, Array], true: dict[str, Array]) -> dict[str, Any
         "within_10_cm": (error[use] < 0.1).mean(), "whole_mean_cm": 100 * error[whole].mean(),
         "whole_median_cm": 100 * np.median(error[whole]),
         "by_joint_cm": {n: 100 * error[:, i][use[:, i]].mean() for i, n in enumerate(JOINTS)},
-        "hidden_cm": 100 * error[true["weight"][people] < 0.5].mean(),
+        "hidden_cm": 100 * error[hidden].mean(),
         "sides_exchanged": paired.mean(), "sides_exchanged_whole": paired[whole].mean(),
         "facing_wrong": wrong[sure].mean(), "facing_wrong_whole": wrong[sure & whole].mean(),
     }  # fmt: skip
@@ -97,7 +98,7 @@ def measure(reported: dict[str, Array], true: dict[str, Array]) -> dict[str, Any
         out["length_within_scale"] = _within(log_off, np.exp(reported["length_scale"][people]))
         each = np.abs(reported["joints"][people] - true["joints"][people]).mean(-1)
         out["joint_within_scale"] = _within(each[use], np.exp(reported["scale"][people])[use])
-        out["hidden_within_scale"] = _within(each[~use], np.exp(reported["scale"][people])[~use])
+        out["hidden_within_scale"] = _within(each[hidden], np.exp(reported["scale"][people])[hidden])
     score = reported["person"]
     out["person"] = {f"{t:+.0f}": [(score[people] > t).mean(), (score[people][whole] > t).mean(), (score[~people] > t).mean()]
                      for t in THRESHOLDS}  # fmt: skip

@@ -2,7 +2,7 @@
 
     python -m lab.training.multiview OUT --seed 1 --clip 05_18 --body 3 [--cameras 4] [--frames 120] [--alike]
 
-Writes OUT/videos/camN.avi, OUT/Calib_scene.toml, init.json, truth.csv and background/, as `voodoo track OUT` and
+Writes OUT/videos/cam_N.avi, OUT/Calib_scene.toml, init.json, truth.csv and background/, as `voodoo track OUT` and
 `lab/experiments/color_regions.py OUT` read them. Nothing was ever tuned on what comes out of it. With `--silhouettes` the
 person is white before black: the most that contours can tell. It needs numba.
 """

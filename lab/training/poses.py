@@ -104,13 +104,15 @@ def _near(d: Array, other: Array, angle: float) -> Array:
 
 
 def load(place: Path, held_out: bool) -> list[Pose]:
-    """The poses of the folder `mocap`: those of the clips for training, or those kept for validation."""
+    """The poses of the folder `mocap`: those of the clips for training, or those kept for validation.
+
+    A clip that is kept from one of the files is trained on from neither; validation has it from that file alone.
+    """
     out = []
-    for name, step in (("poses.npz", 1), ("sequences.npz", 3)):
-        data = np.load(place / name)
-        clips = sorted(set(data["clip"].tolist()))
-        kept = set(clips[HELD_OUT_CLIPS // 2 :: HELD_OUT_CLIPS])
-        use = np.array([(c in kept) == held_out for c in data["clip"].tolist()])
+    files = [(np.load(place / name), step) for name, step in (("poses.npz", 1), ("sequences.npz", 3))]
+    kept = [set(sorted(set(data["clip"].tolist()))[HELD_OUT_CLIPS // 2 :: HELD_OUT_CLIPS]) for data, _ in files]
+    for (data, step), own in zip(files, kept, strict=True):
+        use = np.array([c in own if held_out else c not in set().union(*kept) for c in data["clip"].tolist()])
         xyz = data["positions_m"][use][::step].astype(float)
         xyz = xyz / 1000 if data["positions_m"].dtype.kind == "i" else xyz
         out += from_positions(xyz, data["joint_names"].tolist())
