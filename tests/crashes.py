@@ -284,11 +284,7 @@ def crash(points: int | None, *, seed: int = 0, only: str = "", at: int | None =
     layer, report = ctypes.CDLL(os.environ["LD_PRELOAD"]), Report()
     names = [name for name in KINDS if only in ("", name) and all(map(importlib.util.find_spec, NEEDS.get(name, ())))]
     with tempfile.TemporaryDirectory(prefix="voodoo-crash-") as top:
-        recording = Path(top) / "rec"
-        entries = damage.sound()
-        damage.write(recording / "bag", entries[: damage.depth_rows(entries)[FRAMES]])
-        for beside in ("init.json", "truth.csv"):
-            (recording / beside).write_bytes((damage.sample_path() / beside).read_bytes())
+        recording = damage.beginning(Path(top) / "rec", FRAMES)
         chosen: list[tuple[str, int, str]] = []
         tracked_before(recording)
         for name in names:
