@@ -144,7 +144,8 @@ def test_a_loop_goes_on_in_time(tmp_path):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
 def test_signals_finish_files(tmp_path, number):
-    code = "import sys; from voodoo.cli import main; sys.argv[0] = 'voodoo'; main()"
+    often = "import voodoo.cli.live_run as run; run._LINE_S = 0.2"
+    code = f"import sys; {often}; from voodoo.cli import main; sys.argv[0] = 'voodoo'; main()"
     words = ["live", str(sample_path()), "--loop", "--out", "p.csv", "--record", "t.mcap", "--report", "r.json", *FAST]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     with subprocess.Popen(
@@ -242,8 +243,8 @@ def follower(_frame):
 
 
 def test_a_slow_viewer_holds_nobody_up():
-    slow = Slow(0.8)
-    with played(2.0) as source:
+    slow = Slow(0.4)
+    with played(4.0) as source:
         session = Session(source, follower, outputs=[slow])
         while session.wait(0.05):
             pass

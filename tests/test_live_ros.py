@@ -503,7 +503,7 @@ def test_a_message_lets_everybody_be_searched_for_again():
         forgotten.append(not follower._front.tracker.estimate.joints)  # it may be found again in the same frame
 
     follower.restart = restarted
-    source = PlayedSource(open_recording(sample_path(), use=("depth",)), rate=1.0)
+    source = PlayedSource(open_recording(sample_path(), use=("depth",)), rate=2.0)
     with Live([source], on_message=messages.append) as live:
         session = Session(live, lambda _: follower, outputs=[Asks()])
         while session.wait(0.05):
@@ -513,7 +513,7 @@ def test_a_message_lets_everybody_be_searched_for_again():
     assert statuses[14] != "searching" and forgotten == [True] and statuses[-1] == "tracking"
 
 
-@pytest.mark.parametrize(("root", "rate"), [("camera_depth_optical_frame", 1.0), ("base_link", 8.0)])
+@pytest.mark.parametrize(("root", "rate"), [("camera_depth_optical_frame", 2.0), ("base_link", 8.0)])
 def test_live_topics_stand_on_the_floor_that_is_seen_as_files_do(root, rate):
     recording = open_recording(sample_path(), use=("depth",), root_frame=root)
     node, messages, turns = FakeNode(), [], []
