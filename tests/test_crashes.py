@@ -44,4 +44,6 @@ def test_a_result_that_is_half_written_is_found(tmp_path, monkeypatch):
     folder.mkdir()
     old = crashes.prepared(kind, folder)
     assert crashes.judge(kind, folder, old, 9, "", crashes.KILL) == ([], False)
+    for code in (2, 4):
+        assert "ended with" in crashes.judge(kind, folder, old, code << 8, "", crashes.FAULTS["EIO"])[0][0]
     assert "tells success" in crashes.judge(kind, folder, old, 0, "", crashes.FAULTS["EIO"])[0][0]
