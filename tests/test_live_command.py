@@ -189,7 +189,7 @@ def test_what_cannot_be_is_refused_in_a_line(words, messages):
 
 
 @pytest.mark.parametrize("word", ["browser", "0", "127.0.0.1", "65535", "host:"])
-def test_a_viewer_is_served_at_a_port(word):
+def test_an_address_of_a_viewer_without_a_port_is_refused(word):
     from voodoo.visualization.rerun_server import Server
 
     with pytest.raises(VoodooError, match="expected PORT or HOST:PORT"):
