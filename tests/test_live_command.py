@@ -18,6 +18,7 @@ import typer.testing
 import voodoo
 from live_rig import Rig, depth_of, follower_of
 from voodoo.cli import app
+from voodoo.cli.common import NO_POSE
 from voodoo.errors import VoodooError
 from voodoo.export.people import PeopleTrack
 from voodoo.export.track import Track
@@ -186,6 +187,45 @@ def test_what_cannot_be_is_refused_in_a_line(words, messages):
     assert result.exit_code in (1, 2), result.output
     assert messages in " ".join(result.output.split())
     assert "Traceback" not in result.output
+
+
+class Nowhere(Output):
+    """A place to which poses are sent."""
+
+    def publish(self, step):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("ros2:/depth",), ["ros2://"]),
+        (("ros2:/depth", "--no-publish"), []),
+        (("ros2:/depth", "--to", "ros2://"), ["ros2://"]),
+        (("ros2:/depth", "--to", "vmc://here"), ["vmc://here", "ros2://"]),
+        ((sample_path(), "--use", "depth"), []),
+        ((sample_path(), "--use", "depth", "--publish"), ["ros2://"]),
+    ],
+    ids=lambda words: " ".join(str(word) for word in words if word != sample_path()),
+)
+def test_what_comes_from_ros_is_published_there_by_default(monkeypatch, words, expected):
+    addresses, source = [], played(8.0)
+
+    def sink(address, **how):
+        addresses.append(address)
+        return Nowhere()
+
+    monkeypatch.setattr("voodoo.cli.live_run.sink_of", sink)
+    monkeypatch.setattr("voodoo.live.open", lambda *sources, **how: source)
+    result = live(*words, "--duration", "0.1")
+    assert result.exit_code in (0, NO_POSE), result.output
+    assert addresses == expected
+
+
+def test_a_box_around_everybody_leaves_nobody(tmp_path):
+    result = live(sample_path(), "--rate", "8", *FAST, "--exclude", "0,-9,-9,9,9,9", "--report", tmp_path / "r.json")
+    assert result.exit_code == NO_POSE and "nobody was found" in result.output
+    assert json.loads((tmp_path / "r.json").read_text())["with_pose"] == 0
 
 
 @pytest.mark.parametrize("word", ["browser", "0", "127.0.0.1", "65535", "host:"])
