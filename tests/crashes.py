@@ -198,7 +198,7 @@ def judge(kind: Kind, folder: Path, old: set[str], status: int, output: str, fau
     if stored and not done:
         wrong.append("stored poses were not recovered")
     if fault != KILL:
-        if os.WIFSIGNALED(status) or os.WEXITSTATUS(status) == 3:
+        if os.WIFSIGNALED(status) or os.WEXITSTATUS(status) not in (0, 1):
             wrong.append(f"ended with {status}: {output}")
         complete = all(new.get(name) for name in (*kind.poses, *kind.others))
         if os.WEXITSTATUS(status) == 0 and not complete:
@@ -284,11 +284,7 @@ def crash(points: int | None, *, seed: int = 0, only: str = "", at: int | None =
     layer, report = ctypes.CDLL(os.environ["LD_PRELOAD"]), Report()
     names = [name for name in KINDS if only in ("", name) and all(map(importlib.util.find_spec, NEEDS.get(name, ())))]
     with tempfile.TemporaryDirectory(prefix="voodoo-crash-") as top:
-        recording = Path(top) / "rec"
-        entries = damage.sound()
-        damage.write(recording / "bag", entries[: damage.depth_rows(entries)[FRAMES]])
-        for beside in ("init.json", "truth.csv"):
-            (recording / beside).write_bytes((damage.sample_path() / beside).read_bytes())
+        recording = damage.beginning(Path(top) / "rec", FRAMES)
         chosen: list[tuple[str, int, str]] = []
         tracked_before(recording)
         for name in names:
@@ -307,7 +303,7 @@ def crash(points: int | None, *, seed: int = 0, only: str = "", at: int | None =
         for name, number, fault in chosen:
             wrong, _, recovered = run_point(layer, KINDS[name], recording, number, FAULTS[fault])
             if wrong and KINDS[name].words[0] == "live" and wrong[0].startswith("ended by itself: 0"):
-                wrong = []  # it wrote less often than before: frames come as time goes
+                wrong = wrong[1:]  # it wrote less often than before: frames come as time goes
             report.counts[name] += 1
             report.recovered += recovered
             report.failures += [f"{name}, point {number}, {fault}: {words}" for words in wrong]

@@ -41,6 +41,15 @@ def sound() -> list[Entry]:
     return entries_of(sample_path() / "bag")
 
 
+def beginning(folder: Path, frames: int) -> Path:
+    """The first frames of the bundled recording as a recording of its own."""
+    entries = sound()
+    write(folder / "bag", entries[: depth_rows(entries)[frames]])
+    for name in ("init.json", "truth.csv"):
+        (folder / name).write_bytes((sample_path() / name).read_bytes())
+    return folder
+
+
 def depth_rows(entries: list[Entry]) -> list[int]:
     return [row for row, entry in enumerate(entries) if entry[0] == DEPTH]
 

@@ -78,6 +78,7 @@ def test_nobody_else_can_use_the_workers(python, recordings, tmp_path):
             [python, "-c", INTRUDER, str(batch.pid)], capture_output=True, text=True, timeout=120, check=False
         )
         batch.kill()
+    assert done.returncode == 0, done.stdout + done.stderr
     assert "out" in done.stdout and "IN" not in done.stdout, done.stdout + done.stderr
 
 
@@ -97,7 +98,6 @@ def test_every_recording_is_a_row_and_a_table(python, recordings, tmp_path):
     assert {row["status"] for row in rows.values()} == {"done"} and {row["frames"] for row in rows.values()} == {"90"}
     tables = list((tmp_path / "out" / "frames").glob("*/*"))
     assert len(tables) == RECORDINGS and {table.name for table in tables} == {"part-0.parquet"}
-    assert len({table.read_bytes().count(b"walk") for table in tables}) >= 1
     before = {table: table.stat().st_mtime_ns for table in tables}
     (tmp_path / "out" / "summary.csv").unlink()  # as if the command had died before it wrote it
     tables[0].unlink()

@@ -182,16 +182,8 @@ def test_any_value_of_a_configuration_is_taken_or_named(key, value):
             voodoo.Config(**{key: value})
 
 
-@FAST
-@given(
-    arrays.arrays(
-        st.sampled_from([np.float32, np.float64, np.int64, np.uint16, np.bool_, np.complex64]),
-        arrays.array_shapes(min_dims=0, max_dims=4, min_side=0, max_side=6),
-    ),
-    st.floats(),
-    st.floats(),
-)
-def test_any_array_is_tracked_or_refused_and_no_nan_comes_out(array, stamp, weight):
+def tracked(points, image, stamp, weight):
+    """Which of the two were tracked."""
     body = voodoo.Body.from_toml(THING)
     tracker = voodoo.Tracker(body)
     tracker.reset_pose(rest_pose(body))
@@ -200,29 +192,84 @@ def test_any_array_is_tracked_or_refused_and_no_nan_comes_out(array, stamp, weig
 
     def step():
         frame = voodoo.Frame(stamp=stamp)
-        frame.add_points(array, weight=weight, on_body=True)
+        frame.add_points(points, weight=weight, on_body=True)
         tracker.step(frame)
 
     def depth():
         frame = voodoo.Frame(stamp=stamp)
-        frame.add_depth(array, camera=camera, weight=weight)
+        frame.add_depth(image, camera=camera, weight=weight)
         tracker.step(frame)
 
+    taken = []
     for attempt in (step, depth):
         tracker.reset_pose(rest_pose(body))
-        if not usable(attempt):
+        taken.append(usable(attempt))
+        if not taken[-1]:
             np.testing.assert_array_equal(tracker.estimate.joint_positions, before)
         else:
             assert math.isfinite(stamp) and math.isfinite(weight) and weight > 0.0
         assert np.isfinite(tracker.estimate.limb_poses).all()
+    return taken
+
+
+def share_taken(test, **drawn):
+    """The share of examples, or of each of several parts of them, that a test says were taken."""
+    taken = []
+    FAST(given(**drawn)(lambda **example: taken.append(test(**example))))()
+    return np.mean(taken, axis=0)
+
+
+ANY_ARRAY = arrays.arrays(
+    st.sampled_from([np.float32, np.float64, np.int64, np.uint16, np.bool_, np.complex64]),
+    arrays.array_shapes(min_dims=0, max_dims=4, min_side=0, max_side=6),
+)
 
 
 @FAST
-@given(st.dictionaries(st.sampled_from(["tip", "shoulder", "base"]), st.lists(st.floats(), max_size=4), max_size=3))
-def test_any_start_is_taken_or_refused(joints):
-    tracker = voodoo.Tracker(voodoo.Body.from_toml(THING))
-    if usable(lambda: tracker.reset(joints=joints)):
+@given(ANY_ARRAY, st.floats(), st.floats())
+def test_any_array_is_tracked_or_refused_and_no_nan_comes_out(array, stamp, weight):
+    tracked(array, array, stamp, weight)
+
+
+def test_any_numbers_in_arrays_of_the_right_form_are_tracked_or_refused_and_no_nan_comes_out():
+    rows, near = st.tuples(st.integers(0, 30), st.just(3)), st.floats(-2.0, 2.0, width=32)
+    share = share_taken(
+        tracked,
+        points=st.one_of(
+            arrays.arrays(np.float32, rows, elements=near),
+            arrays.arrays(np.float64, rows, elements=near),
+            arrays.arrays(st.sampled_from([np.float32, np.float64]), rows),
+        ),
+        image=arrays.arrays(st.sampled_from([np.uint16, np.float32]), (6, 6)),
+        stamp=st.floats(allow_nan=False, allow_infinity=False),
+        weight=st.floats(0.0, 1e6, exclude_min=True),
+    )
+    assert (share >= 1 / 3).all(), share
+
+
+def started(joints):
+    """Whether a start of the thing with three sites was taken."""
+    more = "".join(f'\n[[sites]]\nname = "{name}"\nlimb = "base"\nposition = {place}\n' for name, place in SITES)
+    tracker = voodoo.Tracker(voodoo.Body.from_toml(THING + more))
+    taken = usable(lambda: tracker.reset(joints=joints))
+    if taken:
         assert np.isfinite(tracker.estimate.limb_poses).all()
+    return taken
+
+
+SITES = (("side", [0.1, 0, 0]), ("front", [0, 0.1, 0]))
+
+
+@FAST
+@given(st.dictionaries(st.sampled_from(["tip", "side", "front", "no"]), st.lists(st.floats(), max_size=4), max_size=3))
+def test_any_start_is_taken_or_refused(joints):
+    started(joints)
+
+
+def test_any_start_at_places_of_all_sites_is_taken_or_refused():
+    place = st.tuples(*3 * [st.floats(-0.5, 0.5)])
+    share = share_taken(started, joints=st.fixed_dictionaries(dict.fromkeys(("tip", "side", "front"), place)))
+    assert share >= 1 / 3, share
 
 
 if __name__ == "__main__":

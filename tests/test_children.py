@@ -3,7 +3,6 @@
 import importlib.metadata
 import json
 import os
-import shutil
 import socket
 import subprocess
 import sys
@@ -16,7 +15,6 @@ import damage
 import voodoo
 from voodoo.children import children
 from voodoo.cli import app
-from voodoo.recordings import sample_path
 from voodoo.visualization.rerun_server import Server
 
 COMMANDS = {
@@ -54,10 +52,7 @@ def trapped(tmp_path, monkeypatch):
         if name.isidentifier():
             (folder / f"{name}.py").write_text(f"open({str(tmp_path)!r} + '/RAN_{name}', 'w')\n")
     (folder / "b").symlink_to(folder / "a", target_is_directory=True)
-    entries = damage.sound()
-    damage.write(folder / "a" / "bag", entries[: damage.depth_rows(entries)[8]])
-    for name in ("init.json", "truth.csv"):
-        shutil.copy(sample_path() / name, folder / "a")
+    damage.beginning(folder / "a", 8)
     rows = ["stamp_s,status,residual_m,vc7_x,vc7_y,vc7_z", "0.0,tracking,0.01,0,0,1", "0.1,tracking,0.01,0,0,1"]
     (folder / "a" / "pose.csv").write_text("\n".join(rows) + "\n")
     (tmp_path / "voodoo_command.py").write_text("from voodoo.cli import main\nif __name__ == '__main__':\n    main()\n")

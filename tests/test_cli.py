@@ -1,4 +1,5 @@
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import commands
 import voodoo
 from core_fakes import T_POSE, FakeRecording, install
 from voodoo import cli
@@ -315,13 +317,16 @@ def test_ctrl_c_before_the_first_frame_leaves_nothing(run):
     assert not Path("pose.csv").exists() and not Path("demo/pose.csv").exists()
 
 
-def test_demo(run, monkeypatch):
-    monkeypatch.setattr("voodoo.recordings.loaders.sample_path", lambda: Path("sample"))
-    run.tracker.offset, run.tracker.found_at = (0.0, 0.03, 0.0), 1
-    result = run("demo", "--out", "here")
+def test_demo(tmp_path, monkeypatch):
+    """With the tracker itself, on the bundled recording."""
+    monkeypatch.chdir(tmp_path)
+    result = commands.run("demo", "--out", "here")
     assert result.exit_code == 0, result.stderr
-    assert "12 frames, 1 searching, 11 tracking" in result.stdout
-    assert "mean joint error  3.0 cm" in result.stdout
+    assert "bend_scoop: 90 frames, " in result.stdout
+    (error,) = re.findall(r"mean joint error  ([\d.]+) cm", result.stdout)
+    assert 0.5 < float(error) < 6.0
+    assert len(Track.load("here/pose.csv")) == 90
+    assert cv2.VideoCapture("here/overlay.mp4").get(cv2.CAP_PROP_FRAME_COUNT) == 90
     assert sorted(path.name for path in Path("here").iterdir()) == ["overlay.mp4", "pose.csv", "sheet.png"]
     legend = cv2.imread("here/sheet.png")[-36:].reshape(-1, 3)
     for color in (LEFT, RIGHT, SKIN):
@@ -469,11 +474,12 @@ def test_progress_in_a_pipe_is_lines(run, monkeypatch):
     assert "voodoo: fake: 7 of 12\n" in done.stderr and "\r" not in done.stderr and "\x1b" not in done.stderr
 
 
-def test_no_line_is_long(run):
+def test_no_line_of_an_error_is_long(run):
     run.recording = None
     names = " ".join(f"--with somewhere{number}" for number in range(40))
-    for line in run("track", "nowhere/" + "folder " * 60, *names.split()).stderr.splitlines():
-        assert len(line) <= 200
+    done = run("track", "nowhere/" + "folder " * 60, *names.split())
+    assert done.exit_code == 1 and len(done.stderr) > 400
+    assert all(len(line) <= 200 for line in done.stderr.splitlines())
 
 
 @pytest.mark.parametrize("words", [(), ("--out", "pose.npz")])

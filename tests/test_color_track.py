@@ -35,6 +35,19 @@ def films(tmp_path_factory):
     return scene.write_videos(tmp_path_factory.mktemp("films") / "walk", FRAMES)
 
 
+def test_regions_are_drawn_where_it_is_asked_for(tmp_path):
+    bag = scene.write_color_bag(tmp_path / "walk", 2)
+    drawn = {}
+    for name, words in (("plain", ()), ("regions", ("--draw-regions",))):
+        done = run("track", bag, "--out", tmp_path / "pose.csv", "--overlay", tmp_path / name, *words)
+        assert done.exit_code == 0, done.stderr
+        drawn[name] = [cv2.imread(str(picture)) for picture in sorted((tmp_path / name).iterdir())]
+    assert len(drawn["regions"]) == 2
+    for plain, regions in zip(drawn["plain"], drawn["regions"], strict=True):
+        changed = (np.abs(plain.astype(int) - regions).max(axis=2) > 30).mean()
+        assert 0.002 < changed < 0.5, changed
+
+
 def test_a_bag_of_color_topics_and_a_folder_of_videos_give_rows(bag, films, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for folder, first in ((bag, scene.START), (films, 0.0)):

@@ -331,7 +331,9 @@ def test_a_box_leaves_points_out_and_changes_none():
 
 
 def test_evaluation_takes_five_times_as_long_as_tracking_at_most(voodoo_data):
-    """Of images of 640 x 480, where most pixels are not the person's; it took eleven times as long with all of them."""
+    """Of images of 320 x 240, where most pixels are not the person's; it took eleven times as long with all of them.
+
+    With 640 x 480, of which dev_08_jump_l515_cmu is the only recording, it takes five times as long, and six on some days."""
     folder = data_folder(voodoo_data, "rendered", "dev_05_walk")
     recording = open_recording(folder)
 
@@ -341,7 +343,10 @@ def test_evaluation_takes_five_times_as_long_as_tracking_at_most(voodoo_data):
         return time.perf_counter() - began
 
     works = lambda: list(track(recording, start_tracker(recording))), lambda: evaluate(folder)
-    tracking, evaluating = np.min(
-        [[seconds(work) for work in works] for _ in range(2)], axis=0
-    )  # the machine has other work
-    assert evaluating < 5.0 * tracking
+    turns = []
+    for _ in range(4):  # the machine has other work
+        turns.append([seconds(work) for work in works])
+        tracking, evaluating = np.min(turns, axis=0)
+        if evaluating < 5.0 * tracking:
+            return
+    raise AssertionError(f"{evaluating:.2f} s, {tracking:.2f} s of tracking")

@@ -18,6 +18,7 @@ import typer.testing
 import voodoo
 from live_rig import Rig, depth_of, follower_of
 from voodoo.cli import app
+from voodoo.cli.common import NO_POSE
 from voodoo.errors import VoodooError
 from voodoo.export.people import PeopleTrack
 from voodoo.export.track import Track
@@ -185,7 +186,8 @@ def test_a_loop_goes_on_in_time(tmp_path):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
 def test_signals_finish_files(tmp_path, number):
-    code = "import sys; from voodoo.cli import main; sys.argv[0] = 'voodoo'; main()"
+    often = "import voodoo.cli.live_run as run; run._LINE_S = 0.2"
+    code = f"import sys; {often}; from voodoo.cli import main; sys.argv[0] = 'voodoo'; main()"
     words = ["live", str(sample_path()), "--loop", "--out", "p.csv", "--record", "t.mcap", "--report", "r.json", *FAST]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     with subprocess.Popen(
@@ -228,8 +230,47 @@ def test_what_cannot_be_is_refused_in_a_line(words, messages):
     assert "Traceback" not in result.output
 
 
+class Nowhere(Output):
+    """A place to which poses are sent."""
+
+    def publish(self, step):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("ros2:/depth",), ["ros2://"]),
+        (("ros2:/depth", "--no-publish"), []),
+        (("ros2:/depth", "--to", "ros2://"), ["ros2://"]),
+        (("ros2:/depth", "--to", "vmc://here"), ["vmc://here", "ros2://"]),
+        ((sample_path(), "--use", "depth"), []),
+        ((sample_path(), "--use", "depth", "--publish"), ["ros2://"]),
+    ],
+    ids=lambda words: " ".join(str(word) for word in words if word != sample_path()),
+)
+def test_what_comes_from_ros_is_published_there_by_default(monkeypatch, words, expected):
+    addresses, source = [], played(8.0)
+
+    def sink(address, **how):
+        addresses.append(address)
+        return Nowhere()
+
+    monkeypatch.setattr("voodoo.cli.live_run.sink_of", sink)
+    monkeypatch.setattr("voodoo.live.open", lambda *sources, **how: source)
+    result = live(*words, "--duration", "0.1")
+    assert result.exit_code in (0, NO_POSE), result.output
+    assert addresses == expected
+
+
+def test_a_box_around_everybody_leaves_nobody(tmp_path):
+    result = live(sample_path(), "--rate", "8", *FAST, "--exclude", "0,-9,-9,9,9,9", "--report", tmp_path / "r.json")
+    assert result.exit_code == NO_POSE and "nobody was found" in result.output
+    assert json.loads((tmp_path / "r.json").read_text())["with_pose"] == 0
+
+
 @pytest.mark.parametrize("word", ["browser", "0", "127.0.0.1", "65535", "host:"])
-def test_a_viewer_is_served_at_a_port(word):
+def test_an_address_of_a_viewer_without_a_port_is_refused(word):
     from voodoo.visualization.rerun_server import Server
 
     with pytest.raises(VoodooError, match="expected PORT or HOST:PORT"):
@@ -283,8 +324,8 @@ def follower(_frame):
 
 
 def test_a_slow_viewer_holds_nobody_up():
-    slow = Slow(0.8)
-    with played(2.0) as source:
+    slow = Slow(0.4)
+    with played(4.0) as source:
         session = Session(source, follower, outputs=[slow])
         while session.wait(0.05):
             pass
@@ -331,8 +372,9 @@ def test_an_output_that_fails_ends_the_session():
 
 
 def test_in_overload_latency_stays_below_two_processing_times():
-    """Four times as many images as can be published."""
-    slow = Slow(0.044, waits=False)
+    """Four times as many images as can be published; a frame that waits is replaced by the next one, not queued."""
+    busy_s = 0.044
+    slow = Slow(busy_s, waits=False)
     with played(3.0) as source:
         session = Session(source, follower, outputs=[slow])
         while session.wait(0.05):
@@ -343,6 +385,8 @@ def test_in_overload_latency_stays_below_two_processing_times():
     assert report["dropped"] > 45
     assert report["published"] + report["dropped"] == 90
     assert (np.diff(slow.stamps) > 0).all()
+    # In a queue the latency would grow to the end: half of the frames would wait for more than a second.
+    assert report["latency_ms"]["p50"] < 2e3 * busy_s + 150.0
 
 
 # A folder that grows

@@ -20,7 +20,7 @@ from voodoo.export.upright import by_axes, by_floor
 from voodoo.live import Faults, Live, Step
 from voodoo.live.assembly import LiveFrame
 from voodoo.live.recorder import _cloud, _depth, _scan, camera_info, transforms
-from voodoo.live.ros2.dds import _LOOPBACK, Node, Offer, dds_name, ros_name
+from voodoo.live.ros2.dds import _LOOPBACK, Node, Offer, dds_name, domain_id, ros_name
 from voodoo.live.ros2.feed import ROOT_PATIENCE_S, TF, RosFeed
 from voodoo.live.session import Output, Session
 from voodoo.live.sinks.ros2 import RESET, Ros2Sink
@@ -216,6 +216,21 @@ def test_names_of_types():
     assert dds_name("sensor_msgs/msg/Image") == "sensor_msgs::msg::dds_::Image_"
     assert ros_name("sensor_msgs::msg::dds_::Image_") == "sensor_msgs/msg/Image"
     assert ros_name("DCPSParticipant") == ""
+
+
+@pytest.mark.parametrize(("word", "number"), [("", 0), ("0", 0), ("232", 232), (None, 0)])
+def test_the_domain_is_a_number(monkeypatch, word, number):
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    if word is not None:
+        monkeypatch.setenv("ROS_DOMAIN_ID", word)
+    assert domain_id() == number
+
+
+@pytest.mark.parametrize("word", ["abc", "233", "-1", "1.0"])
+def test_a_wrong_domain_is_refused(monkeypatch, word):
+    monkeypatch.setenv("ROS_DOMAIN_ID", word)
+    with pytest.raises(voodoo.VoodooError, match=f"ROS_DOMAIN_ID: expected a number from 0 to 232, found '{word}'"):
+        domain_id()
 
 
 def test_nodes_of_this_machine_find_each_other_by_its_address(monkeypatch):
@@ -503,7 +518,7 @@ def test_a_message_lets_everybody_be_searched_for_again():
         forgotten.append(not follower._front.tracker.estimate.joints)  # it may be found again in the same frame
 
     follower.restart = restarted
-    source = PlayedSource(open_recording(sample_path(), use=("depth",)), rate=1.0)
+    source = PlayedSource(open_recording(sample_path(), use=("depth",)), rate=2.0)
     with Live([source], on_message=messages.append) as live:
         session = Session(live, lambda _: follower, outputs=[Asks()])
         while session.wait(0.05):
@@ -513,7 +528,7 @@ def test_a_message_lets_everybody_be_searched_for_again():
     assert statuses[14] != "searching" and forgotten == [True] and statuses[-1] == "tracking"
 
 
-@pytest.mark.parametrize(("root", "rate"), [("camera_depth_optical_frame", 1.0), ("base_link", 8.0)])
+@pytest.mark.parametrize(("root", "rate"), [("camera_depth_optical_frame", 2.0), ("base_link", 8.0)])
 def test_live_topics_stand_on_the_floor_that_is_seen_as_files_do(root, rate):
     recording = open_recording(sample_path(), use=("depth",), root_frame=root)
     node, messages, turns = FakeNode(), [], []

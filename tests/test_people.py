@@ -85,10 +85,9 @@ def test_who_is_hidden_does_not_move_to_who_enters():
     truth = recording.people
     row = np.abs(truth.stamps - last.estimate.stamp).argmin()
     assert 0.05 < truth.in_view[row, 0] < 0.1 and truth.in_view[row, 3] >= 0.5
-    first = next((person for person in last.estimate if person.id == 1), None)
-    if first is not None:
-        away = first.estimate.joints["humanoid_root"] - truth.of("humanoid_root")[row, 0]
-        assert np.linalg.norm(away) < 0.3
+    first = next(person for person in last.estimate if person.id == 1)
+    away = first.estimate.joints["humanoid_root"] - truth.of("humanoid_root")[row, 0]
+    assert np.linalg.norm(away) < 0.3
 
 
 def test_who_comes_back_from_behind_others_is_not_found_twice():

@@ -1,7 +1,7 @@
 """voodoo track --people: rows, files of every kind, pictures; and recordings of made-up people."""
 
 import csv
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from voodoo.evaluation.people_evaluate import judge
 from voodoo.export.files import save
 from voodoo.export.people import PeopleTrack
 from voodoo.export.track import Track
-from voodoo.measurements import MarkerSet, RecordedFrame
+from voodoo.measurements import LaserScan, MarkerSet, RecordedFrame
 from voodoo.names import SEARCHING
 from voodoo.pipeline.run import track
 from voodoo.recordings import SensorInfo
@@ -254,8 +254,11 @@ def test_a_frame_that_is_refused_costs_no_other_one(run, monkeypatch):
     assert "left out 1 that the tracker refuses" in message.stderr
 
 
-def test_boxes_and_the_floor_reach_the_frame():
+def test_boxes_reach_the_frame():
+    """Without one there are two persons in the end."""
     recording = two_people()
+    *_, last = track(recording, voodoo.People(), settings=FrontEndSettings(use=("depth",)))
+    assert len(last.estimate) == 2
     everywhere = FrontEndSettings(use=("depth",), exclude=(((0.0, -5.0, -1.0), (9.0, 5.0, 3.0)),))
     steps = list(track(recording, voodoo.People(), settings=everywhere))
     assert all(len(step.estimate) == 0 for step in steps)
@@ -273,10 +276,12 @@ def test_skin_is_searched_for_on_everybody_where_it_is_asked_for():
     assert min(used["depth", "skin"]) >= 1, used
 
 
+@dataclass(frozen=True)
 class Tag:
     """A measurement that a registered adapter knows."""
 
-    sensor, stamp = "tag", 0.0
+    stamp: float
+    sensor: str = "tag"
 
 
 class TagAdapter(Adapter):
@@ -290,16 +295,16 @@ class TagAdapter(Adapter):
 
 @pytest.fixture
 def with_sensor(monkeypatch):
-    """The made-up recording with another sensor, which measures the same in every frame."""
+    """The made-up recording with another sensor, which is made for each stamp."""
 
-    def added(kind, item):
+    def added(kind, make, begin=30):
         plain, about = MadeUpRecording.__iter__, two_people().info()
-        sensor = SensorInfo(item.sensor, kind, about.root_frame, 3, 30.0, "")
+        sensor = SensorInfo(make(0.0).sensor, kind, about.root_frame, 3, 30.0, "")
         monkeypatch.setattr(MadeUpRecording, "info", lambda _: replace(about, sensors=(*about.sensors, sensor)))
 
         def several(recording):
-            for frame in islice(plain(recording), 30, 33):
-                yield RecordedFrame(frame.stamp, (item, *frame.measurements))
+            for frame in islice(plain(recording), begin, None):
+                yield RecordedFrame(frame.stamp, (make(frame.stamp), *frame.measurements))
 
         monkeypatch.setattr(MadeUpRecording, "__iter__", several)
 
@@ -328,12 +333,13 @@ USED = {
     "markers, `--marker-map`": (),
     "any other registered adapter": (),
     "an adapter with `while_searching`": (),
-    "`--exclude`, `--depth-range`, `--height`, `--age`, `--upright`": (
-        *("--exclude", "8,8,8,9,9,9", "--depth-range", "0.5,7", "--height", "1.7", "--upright"),
-    ),
 }
-ELSEWHERE = {"keypoints of several cameras", "point clouds, laser scans"}
-"""Rows with tests of their own: test_people.py, test_what_does_not_go_together_is_refused."""
+ELSEWHERE = {
+    "keypoints of several cameras",  # test_people.py
+    "point clouds, laser scans",
+    "`--exclude`, `--depth-range`, `--height`, `--age`, `--upright`",
+}
+"""Rows with tests of their own."""
 
 
 def test_the_table_of_what_works_with_several_people_is_tested():
@@ -345,27 +351,108 @@ def test_the_table_of_what_works_with_several_people_is_tested():
     }
 
 
+@pytest.fixture
+def everybody(monkeypatch):
+    """Persons of each frame that a command tracks, and their bodies."""
+    found, bodies, step = [], {}, voodoo.People.step
+
+    def stepped(people, *items, **own):
+        estimate = step(people, *items, **own)
+        found.append({person.id: person.estimate for person in estimate})
+        bodies.update({one: people.body(one) for one in found[-1]})
+        return estimate
+
+    monkeypatch.setattr(voodoo.People, "step", stepped)
+    return found, bodies
+
+
 @pytest.mark.parametrize("what", [*REFUSED, *USED])
-def test_what_works_with_several_people(run, with_sensor, what, tmp_path):
+def test_what_works_with_several_people(run, with_sensor, everybody, what, monkeypatch):
     words, options = REFUSED.get(what, ("", USED.get(what)))
+    found, _ = everybody
+    monkeypatch.setattr(TagAdapter, "seen", 0)
     if "adapter" in what:
         adapter = TagAdapter()
         adapter.while_searching = "while_searching" in what
         register(adapter)
     try:
         if "markers" in what:
-            with_sensor("markers", MarkerSet("m", 1.0, {"l_wrist": (0.0, 0.0, 1.0)}))
+            wrist = two_people().people.of("l_wrist")[-1, 1]
+            with_sensor("markers", lambda stamp: MarkerSet("m", stamp, {"l_wrist": tuple(wrist)}), begin=22)
         elif "adapter" in what:
-            with_sensor("tag", Tag())
+            with_sensor("tag", Tag)
         if "body" in what:
             Path("lamp.toml").write_text(LAMP)
         done = run("--people", "2", *options, "--out", "x.csv")
-        assert (done.exit_code, words in done.stderr) == (1 if words else 0, True), done.output
-        if "adapter" in what:
-            assert TagAdapter.seen > 0
     finally:
         if "adapter" in what:
             unregister("tag")
+    assert (done.exit_code, words in done.stderr) == (1 if words else 0, True), done.output
+    if words:
+        return
+    assert found[-1].keys() == {1, 2}
+    used = {one: {name for name, row in estimate.sources.items() if row[1]} for one, estimate in found[-1].items()}
+    assert all("/camera/depth" in sources for sources in used.values())
+    if "skin" in what:
+        assert all(COLOR in sources for sources in used.values())
+    elif "markers" in what:
+        truth = two_people().people.of("humanoid_root")[-1]
+        near = {
+            one: np.linalg.norm(truth - each.joints["humanoid_root"], axis=1).argmin()
+            for one, each in found[-1].items()
+        }
+        assert {near[one] for one in used if "m" in used[one]} == {1}
+    elif "adapter" in what:  # in the first of two frames nobody is known
+        assert TagAdapter.seen == (2 if "while_searching" in what else 1)
+
+
+@pytest.mark.parametrize("options", [("--exclude", "0,-5,-1,9,5,3"), ("--depth-range", "0.1,1.0")], ids=" ".join)
+def test_who_is_cut_off_is_not_found(run, options):
+    done = run("--people", "any", *options, "--out", "x.csv")
+    assert done.exit_code == NO_POSE and "nobody was found" in done.stderr
+
+
+@pytest.mark.parametrize("options", [("--height", "1.5"), ("--age", "6")], ids=" ".join)
+def test_a_stature_or_an_age_holds_for_everybody(run, everybody, options):
+    """Sizes are fitted from there, and those who are taller come out too small."""
+    _, bodies = everybody
+    lengths = []
+    for more in ((), options):
+        assert run("--people", "2", *more, "--out", "x.csv").exit_code == 0
+        lengths.append([sum(limb.shape.length for limb in bodies[one].limbs) for one in (1, 2)])
+    assert (np.array(lengths[1]) < 0.97 * np.array(lengths[0])).all()
+
+
+def test_upright_is_taken_for_everybody(run):
+    done = run("--people", "2", "--upright", "--out", "x.csv")
+    assert done.exit_code == 0 and "--upright turned nothing: z = 0 of the root frame is the floor" in done.stderr
+
+
+def laser():
+    """Returns of the legs of both in the last frame, 0.4 m above the floor."""
+    pose = np.eye(4)
+    pose[2, 3] = 0.4
+    places = places_in(two_people(), -1)
+    x, y = places[(np.abs(places[:, 2] - 0.4) < 0.03) & (places[:, 0] < 4.4)].T[:2]
+    step, ranges = np.radians(0.5), np.full(361, np.nan, np.float32)
+    rays = np.rint((np.arctan2(y, x) + np.pi / 2) / step).astype(int)
+    ranges[rays] = np.hypot(x, y)
+    return LaserScan("laser", 0.0, ranges, -np.pi / 2, step, 0.05, 20.0, pose)
+
+
+def test_a_scan_is_assigned_by_the_surface_and_is_an_error_alone(run, with_sensor, everybody):
+    found, _ = everybody
+    scan, chance = laser(), np.random.default_rng(0)
+
+    def measured(stamp):
+        return replace(scan, stamp=stamp, ranges=scan.ranges + chance.normal(0.0, 0.005, 361).astype(np.float32))
+
+    with_sensor("scan", measured, begin=26)
+    assert run("--people", "2", "--out", "x.csv").exit_code == 0
+    given, matched, _ = zip(*(found[-1][one].sources["laser"] for one in (1, 2)), strict=True)
+    assert min(matched) > 5 and sum(given) <= np.isfinite(scan.ranges).sum()
+    alone = run("--people", "2", "--use", "scan", "--out", "x.csv")
+    assert alone.exit_code == 1 and "several people are found in depth images" in alone.stderr
 
 
 @pytest.mark.parametrize(

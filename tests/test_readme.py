@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-import voodoo
+import damage
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -42,14 +42,15 @@ def test_the_two_commands_are_there_and_call_what_they_report():
 
 def test_the_commands_on_a_recording_run(tmp_path):
     """The README's `voodoo` lines, on a few frames of the bundled recording."""
-    recording = str(voodoo.recordings.sample_path())
+    recording = str(damage.beginning(tmp_path / "recording", 12))
     first, *lines = blocks(README, "sh")[1].splitlines()
     assert first.startswith("source .venv/bin/activate")
     for line in lines:
         words = line.split()
         assert words[0] == "voodoo"
         run([*VOODOO, *(recording if word == "RECORDING" else word for word in words[1:])], tmp_path)
-    assert (tmp_path / "pose.csv").stat().st_size > 1000 and (tmp_path / "look.mp4").stat().st_size > 1000
+    assert len((tmp_path / "pose.csv").read_text().splitlines()) == 1 + 12 and (tmp_path / "pose.bvh").exists()
+    assert (tmp_path / "look.mp4").stat().st_size > 1000
 
 
 def test_the_lamp_is_tracked():

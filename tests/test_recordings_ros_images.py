@@ -9,6 +9,7 @@ import pytest
 from ros_bags import DEPTH, INFO, TF, M, bag, compressed_depth, depth_entry, only
 from voodoo.errors import RecordingError
 from voodoo.recordings import ColorImage, open_recording
+from voodoo.recordings.pictures import decode_depth_png
 
 
 @pytest.mark.parametrize("big", [False, True])
@@ -57,23 +58,28 @@ def test_the_raw_depth_is_preferred_to_its_compressed_copy(tmp_path):
 PNG = cv2.imencode(".png", np.random.default_rng(1).integers(0, 9000, (3, 4)).astype(np.uint16))[1].tobytes()
 
 
+def changed(position):
+    data = bytearray(PNG)
+    data[position] ^= 0x55
+    return bytes(data)
+
+
 @pytest.mark.parametrize("cut", range(0, len(PNG), 3))
-def test_a_cut_png_is_refused(tmp_path, cut):
-    entry = (
-        "/d/depth/image/compressedDepth",
-        10.0,
-        M.compressed(10.0, b"\0" * 12 + PNG[:cut], "16UC1; compressedDepth"),
-    )
-    with pytest.raises(RecordingError, match=r"compressedDepth, stamp 10\.0+: expected"):
-        list(open_recording(bag(tmp_path, TF, INFO, entry)))
+def test_a_cut_png_is_refused(cut):
+    with pytest.raises(RecordingError, match=r"^image: expected"):
+        decode_depth_png(PNG[:cut], "image", (4, 3))
 
 
 @pytest.mark.parametrize("position", range(0, len(PNG), 2))
-def test_a_changed_png_is_refused(tmp_path, position):
-    data = bytearray(b"\0" * 12 + PNG)
-    data[12 + position] ^= 0x55
-    entry = ("/d/depth/image/compressedDepth", 10.0, M.compressed(10.0, bytes(data), "16UC1; compressedDepth"))
-    with pytest.raises(RecordingError, match="compressedDepth"):
+def test_a_changed_png_is_refused(position):
+    with pytest.raises(RecordingError, match=r"^image: expected"):
+        decode_depth_png(changed(position), "image", (4, 3))
+
+
+@pytest.mark.parametrize("png", [PNG[:60], changed(60)], ids=["cut", "changed"])
+def test_a_damaged_png_of_a_bag_is_refused_by_its_topic_and_stamp(tmp_path, png):
+    entry = ("/d/depth/image/compressedDepth", 10.0, M.compressed(10.0, b"\0" * 12 + png, "16UC1; compressedDepth"))
+    with pytest.raises(RecordingError, match=r"compressedDepth, stamp 10\.0+: expected"):
         list(open_recording(bag(tmp_path, TF, INFO, entry)))
 
 

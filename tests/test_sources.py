@@ -310,7 +310,7 @@ def test_a_weight_changes_no_run_time_and_a_sensor_costs_its_own_data_only():
     assert done[1.0, True][1]["rays"] == (1, 1)
 
 
-def test_a_frozen_color_camera_is_left_out(whole):
+def test_a_frozen_color_camera_is_left_out():
     held = {}
 
     def freeze(index, items):
@@ -322,11 +322,14 @@ def test_a_frozen_color_camera_is_left_out(whole):
     tracker = voodoo.Tracker(voodoo.Body.human(height=recording.start["height_m"]))
     tracker.reset(joints=recording.start["joints"], fit_sizes=True)
     front_end = FrontEnd(tracker, settings=FrontEndSettings(use=("depth", "skin"), ground_z=0.0))
-    named = 0
+    frozen, estimates = [], []
     for index, (recorded, _) in enumerate(zip(paired(recording), range(FRAMES), strict=False)):
-        front_end.step(RecordedFrame(recorded.stamp, tuple(freeze(index, list(recorded.measurements)))))
-        named += any("color" in name for name in front_end.frozen)
-    assert named > 20
+        items = tuple(freeze(index, list(recorded.measurements)))
+        estimates.append(front_end.step(RecordedFrame(recorded.stamp, items)))
+        frozen.append(any("color" in name for name in front_end.frozen))
+    assert sum(frozen) > 20
+    given = [of(estimate, "color") is not None for estimate in estimates]
+    assert not any(given[index] for index in range(FRAMES) if frozen[index]) and any(given)
 
 
 def test_a_face_pulls_less_while_depth_shows_the_head():

@@ -12,6 +12,8 @@ HEAVY = ("numpy", "cv2", "scipy", "matplotlib", "rosbags", "pydantic", "tomlkit"
 EXTRA = ("scipy", "matplotlib", "motmetrics", "pandas", "rerun", "onnxruntime", "pyarrow", "distributed", "torch")
 """What no tracker needs: it comes with an extra."""
 IMPORT_LIMIT_S = 0.15
+TURNS = 8
+"""Measurements at most, because other programs share the machine's caches."""
 TYPERS_OWN = "pydantic"
 """Typer checks the options of a command with it, even for its help."""
 OF_TYPER = 2.0
@@ -47,20 +49,24 @@ def processor_seconds(code, words=()):
 
 
 def test_the_package_is_imported_at_once():
-    assert min(processor_seconds("import voodoo") for _ in range(8)) < IMPORT_LIMIT_S
+    assert any(processor_seconds("import voodoo") < IMPORT_LIMIT_S for _ in range(TURNS))
 
 
 @pytest.mark.parametrize("words", [["--version"], ["--help"]], ids=" ".join)
 def test_help_and_version_are_there_at_once(words):
-    """In turns with what it is compared with, the best of each."""
-    turns = [(processor_seconds("import typer"), processor_seconds(CLI, words)) for _ in range(8)]
-    typer, own = map(min, zip(*turns, strict=True))
-    assert own < OF_TYPER * typer, f"{own:.2f} s at best, {typer:.2f} s of it Typer"
+    """In turns with what it is compared with, the best of each; more turns where the machine is busy."""
+    turns = []
+    for _ in range(TURNS):
+        turns.append((processor_seconds("import typer"), processor_seconds(CLI, words)))
+        typer, own = map(min, zip(*turns, strict=True))
+        if len(turns) >= 3 and own < OF_TYPER * typer:
+            return
+    raise AssertionError(f"{own:.2f} s at best, {typer:.2f} s of it Typer")
 
 
 def test_the_version_takes_less_than_a_tenth_of_a_second():
     version = "import runpy, sys; sys.argv[1:] = ['--version']; runpy.run_module('voodoo', run_name='__main__')"
-    assert min(processor_seconds(version) for _ in range(8)) < 0.1
+    assert any(processor_seconds(version) < 0.1 for _ in range(TURNS))
     done = subprocess.run([sys.executable, "-m", "voodoo", "--version"], capture_output=True, text=True, check=True)
     assert done.stdout == f"voodoo {voodoo.__version__}\n"
 

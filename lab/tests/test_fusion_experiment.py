@@ -1,16 +1,27 @@
 """Joints of the disturbed starts of lab/experiments/fusion_experiment.py that were once lost."""
 
+import functools
+from pathlib import Path
+
 import numpy as np
 
 import voodoo
 from lab_scripts import load_experiment
 from voodoo.pipeline.pairing import paired
+from voodoo.recordings import RecordedFrame, Recording
+
+
+@functools.cache
+def opened(folder: Path) -> tuple[Recording, list[RecordedFrame]]:
+    """A recording and its frames, for all starts."""
+    recording = voodoo.open_recording(folder)
+    return recording, list(paired(recording))
 
 
 def errors_of(folder, joint: str, *, mode: str, start: int) -> np.ndarray:
     """Errors (F,) [m] of a joint of a rendered recording from a disturbed start."""
-    recording = voodoo.open_recording(folder)
-    errors, _ = load_experiment("fusion_experiment").track(recording, list(paired(recording)), "chain", mode, start)
+    recording, frames = opened(folder)
+    errors, _ = load_experiment("fusion_experiment").track(recording, frames, "chain", mode, start)
     return errors[:, recording.reference.names.index(joint)]
 
 

@@ -40,7 +40,7 @@ def test_wrong_frames_are_those_called_tracking_far_from_the_person(both):
     assert counts.greatest == pytest.approx(0.7)
 
 
-@pytest.mark.parametrize("speed", [0.3, 0.8, 1.4])
+@pytest.mark.parametrize("speed", [0.8, *(pytest.param(speed, marks=pytest.mark.long) for speed in (0.3, 1.4))])
 def test_whoever_is_hidden_in_a_cartwheel_is_not_taken_for_the_one_in_front(voodoo_data, speed):
     """The passer-by is tracked as well, and owns their pixels, also where they touch in the first frame."""
     example = load_experiment("passer_by")

@@ -112,15 +112,15 @@ def near_joints(points: FloatArray, joints: Mapping[str, FloatArray]) -> BoolArr
     near = np.zeros(len(points), dtype=bool)
     if not known:
         return near
-    inside = within_boxes(points, [_around(known)])  # most pixels are far from all persons
-    starts, ends, radii = map(np.array, zip(*known, strict=True))
-    axes, about = ends - starts, points[inside].T
-    lengths = np.maximum((axes**2).sum(axis=1), 1e-12)[:, None]
-    # Of all capsules at once, from the products of points with starts and axes.
-    along = axes @ about - (axes * starts).sum(axis=1)[:, None]
-    t = np.clip(along / lengths, 0.0, 1.0)
-    squares = (about**2).sum(axis=0) - 2.0 * starts @ about - t * (2.0 * along - t * lengths)
-    near[inside] = (squares <= (radii**2 - (starts**2).sum(axis=1))[:, None]).any(axis=0)
+    inside = np.flatnonzero(within_boxes(points, [_around(known)]))  # most pixels are far from all persons
+    about = np.asfortranarray(points[inside])
+    for capsule in known:
+        start, end, radius = capsule
+        some = np.flatnonzero(within_boxes(about, [_around([capsule])]))  # of a person, most are far from a limb
+        axis, (x, y, z) = end - start, about[some].T - start[:, None]
+        t = np.clip((axis[0] * x + axis[1] * y + axis[2] * z) / max(float(axis @ axis), 1e-12), 0.0, 1.0)
+        squares = (x - t * axis[0]) ** 2 + (y - t * axis[1]) ** 2 + (z - t * axis[2]) ** 2
+        near[inside[some[squares <= radius**2]]] = True
     return near
 
 

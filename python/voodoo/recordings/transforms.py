@@ -53,7 +53,8 @@ class _Edge:
         if static:
             self.stamps, self.transforms, self.constant = [stamp], [transform], True
             return
-        if self.transforms and not np.array_equal(self.transforms[0], transform):
+        first = self.transforms[0] if self.transforms else transform
+        if first is not transform and not np.array_equal(first, transform):
             self.constant = False
         at = bisect_right(self.stamps, stamp)
         self.stamps.insert(at, stamp)
@@ -98,6 +99,7 @@ class TransformTree:
         self.source = source
         self.max_age = max_age
         self._neighbors: dict[str, dict[str, tuple[_Edge, bool]]] = {}
+        self._last: dict[tuple[str, str], tuple[tuple[float, ...], FloatArray]] = {}
 
     @property
     def frames(self) -> tuple[str, ...]:
@@ -126,10 +128,21 @@ class TransformTree:
         if not parent or not child or parent == child:
             raise RecordingError(f"{where}: expected two different frame names")
         stamp = seconds(item.header.stamp)
-        transform = matrix(item.transform.translation, item.transform.rotation, where)
+        transform = self._matrix((parent, child), item.transform, where)
         moved = stamp if static or self._set_back is None else self._set_back.of(f"{parent} {child}", stamp)
         if moved is not None:
             self.add_edge(parent, child, moved, transform, static=static)
+
+    def _matrix(self, frames: tuple[str, str], item: Message, where: str) -> FloatArray:
+        """(4, 4) of a geometry_msgs/Transform. Most never change and are sent many times a second: while the numbers are the
+        same, so is the array."""
+        place, turn = item.translation, item.rotation
+        numbers = (place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w)
+        before, made = self._last.get(frames, (None, None))
+        if made is None or numbers != before:
+            made = matrix(place, turn, where)
+            self._last[frames] = numbers, made
+        return made
 
     def add_edge(self, parent: str, child: str, stamp: float, transform: FloatArray, *, static: bool) -> None:
         """Add parent_from_child (4, 4) at a stamp [s]."""
