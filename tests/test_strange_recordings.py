@@ -49,6 +49,13 @@ def test_what_librealsense_records_is_read(name):
     np.testing.assert_allclose(found, color_from_depth, atol=1e-6)
 
 
+def test_the_unit_of_depth_is_the_recordings(tmp_path):
+    copy = tmp_path / "r.db3"
+    copy.write_bytes((REALSENSE / "recorded_2_59.db3").read_bytes().replace(b"\x000.001000\x00", b"\x000.000100\x00"))
+    images = [item for frame in open_recording(copy) for item in frame.measurements if isinstance(item, DepthImage)]
+    assert {item.meters_per_unit for item in images} == {0.0001}
+
+
 def test_the_stamps_of_a_bag_are_the_cameras_own():
     stamps = [frame.stamp for frame in open_recording(REALSENSE / "recorded_2_55.bag")]
     np.testing.assert_allclose(stamps, 100.0 + np.arange(6) / 30.0, atol=1e-6)

@@ -672,7 +672,7 @@ class Detector:
     """Detects people in depth images with a small network that ships with the library.
 
     Args:
-        weights: path of another network's weights, as training/ exports them; None means those that ship with the library.
+        weights: path of another network's weights, as lab/training exports them; None means those that ship with the library.
         stature: stature of the people [m], if it is known: lengths are scaled to it.
         stature_sigma: relative standard deviation of `stature`.
 

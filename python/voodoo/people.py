@@ -82,7 +82,8 @@ class People:
     Args:
         body: body that is copied for every new person; None: `Body.human()`.
         config: parameters; `threads` persons are tracked in parallel, with bit-identical results.
-        detector: finds persons in depth images, as for `Tracker`; with None only persons passed to `add` are tracked.
+        detector: finds persons in depth images, as for `Tracker`; with None only those of `add` and
+            `Frame.add_detection` are tracked.
         limit: largest number of persons tracked at the same time; None: any number.
         nearest: of more than `limit` persons those nearest to a depth camera are tracked; else those who came first.
         forget_after: a person who was away for longer counts as new [s].

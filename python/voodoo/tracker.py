@@ -40,8 +40,7 @@ class Tracker:
     """Tracks one body through frames.
 
     Use a tracker from one thread at a time: during a step, any other call to it raises VoodooError. Different trackers can
-    run in parallel, since `step` releases the GIL. Create a tracker with several threads (`Config.threads`) in the process
-    that steps it: its threads do not survive a fork, and a step after a fork would wait for them forever.
+    run in parallel, since `step` releases the GIL. A tracker goes on in a forked process: its threads are started again there.
 
     Args:
         body: body to track, with its initial sizes.
@@ -149,7 +148,8 @@ class Tracker:
         auto-initialized returns to searching when the person has left.
 
         Raises:
-            MeasurementError: time not after the last frame, an invalid measurement, or no pose yet and `can_search` is false.
+            MeasurementError: time not after the last frame, an invalid measurement, or no pose, `can_search` false and no
+                detection.
             BodyError: the frame names a limb or site that is not in the body.
         """
         return self._core.step(of_kind("frame", frame, Frame, MeasurementError))

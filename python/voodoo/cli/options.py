@@ -42,7 +42,7 @@ InitOption = Annotated[
     typer.Option(
         metavar="FILE|auto",
         help="First pose as JSON, or an earlier result (.csv, .npz); auto: search for a person, even if there is a start beside "
-        "the recording. By default the recording's start; auto if it has none.",
+        "the recording. By default the recording's start, except live; else auto.",
     ),
 ]
 AutoOption = Annotated[

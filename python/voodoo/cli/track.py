@@ -88,8 +88,8 @@ def track_command(
     --init FILE gives the pose in the first frame, by any subset of names that determines it, or with stamp_s in a later frame:
     {"height_m": 1.76, "joints": {"l_shoulder": [3.1, -0.3, 1.4], "r_shoulder": [3.2, 0.1, 1.4], ...}}
 
-    --people any or N tracks several persons, detected in depth images; no start is read. The .csv then has a row for every
-    person who is present; person is an id from 1, which is kept when a person returns.
+    --people any or N tracks several persons, found in depth, keypoints or markers; no start is read. The .csv then has a row for
+    every person who is present; person is an id from 1, which is kept when a person returns.
     The .npz, .glb and bags have all persons (frames body_p1, ...); others have one file per person: NAME_1.bvh, ...
 
     Examples

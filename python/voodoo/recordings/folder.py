@@ -54,7 +54,7 @@ class FolderRecording(Recording):
         cy = 239.5
         # all that follows is optional
         distortion = []                # OpenCV order
-        model = "plumb_bob"            # or rational_polynomial, equidistant
+        model = "plumb_bob"            # or rational_polynomial, equidistant, inverse_plumb_bob
         mirrored = false               # true: images are mirrored left to right, and are flipped back
         depth_factor = 5000.0          # units per meter
         sensor_frame = "camera_depth_optical_frame"

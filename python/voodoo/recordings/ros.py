@@ -183,11 +183,11 @@ class RosRecording(Recording):
     def _unit(self, topic: str, otherwise: float) -> float:
         """Scale of 16-bit depth in meters: the value of librealsense's recorder, if there is one."""
         units = realsense.beside(topic, realsense.UNITS)
-        if not self._bag.realsense or all(item.name != units for item in self._bag.topics):
+        if all(item.name != units for item in self._bag.topics):
             return otherwise
         where = f"{self.path}, topic {units}"
         with reading(where, "a readable message"):
-            return number_option(where, "meters_per_unit", float(f"{self._bag.first(str(units)).data:.7g}"))
+            return number_option(where, "meters_per_unit", float(f"{float(self._bag.first(str(units)).data):.7g}"))
 
     def _read_transforms(self, asked: str | None, sources: Sequence[TopicSource]) -> str:
         """Fill the transform tree and choose the root frame."""
