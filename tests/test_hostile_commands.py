@@ -17,7 +17,7 @@ from voodoo.errors import RecordingError, VoodooError
 from voodoo.evaluation.report import markdown
 from voodoo.evaluation.score import Score
 from voodoo.recordings import sample_path
-from voodoo.recordings.videos import _opened
+from voodoo.recordings.videos import opened_video
 from voodoo.visualization.image_writer import PictureWriter, save_picture
 
 
@@ -74,7 +74,7 @@ def test_names_of_other_bytes_do_not_reach_opencv(tmp_path):
     if sys.platform == "linux":  # others have no such files
         (tmp_path / f"{LATIN}.avi").touch()
         with pytest.raises(RecordingError, match="expected a name in UTF-8"):
-            _opened(tmp_path / f"{LATIN}.avi")
+            opened_video(tmp_path / f"{LATIN}.avi")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="no such names here")
