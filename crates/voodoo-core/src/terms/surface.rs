@@ -45,8 +45,9 @@ pub(crate) fn cost_of_points(matches: &LimbMatches, candidates: &Candidates) -> 
     let LimbMatches { candidate, left_out, weight, base_weight, surface, .. } = matches;
     let pairs = weight.iter().zip(base_weight).zip(candidate.iter().zip(&surface.signed_distance));
     let cost = |((weight, base_weight), (candidate, distance)): ((&f32, &f32), (&u32, &f32))| {
-        let area = candidates.area[*candidate as usize] * (weight / base_weight);
-        f64::from(area) * (unexplained(f64::from(*distance)) - PATCH)
+        // A weight that is too small for single precision is zero.
+        let kept = if *base_weight > 0.0 { weight / base_weight } else { 0.0 };
+        f64::from(candidates.area[*candidate as usize] * kept) * (unexplained(f64::from(*distance)) - PATCH)
     };
     let of_each = (candidate.len() + left_out.len()) as f64 / candidate.len().max(1) as f64;
     of_each * pairs.map(cost).sum::<f64>()
