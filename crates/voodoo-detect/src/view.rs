@@ -50,13 +50,13 @@ impl ThinnedImage {
                 let place = |[x, y]: [f32; 2]| f64::from(z) * Vec3::new(f64::from(x), f64::from(y), 1.0);
                 let excluded =
                     || !around.excluded.is_empty() && around.excludes(image.world_from_sensor * place(*slope));
-                let kept = returned && !excluded();
+                let kept = returned && !around.is_others(index) && !excluded();
                 self.depth.push(if kept { z } else { 0.0 });
             }
         }
     }
 
-    /// Removes what is known.
+    /// Removes the known scene.
     pub(crate) fn remove_explained(&mut self, around: &Surroundings) {
         let width = self.camera.as_ref().map_or(0, Camera::width);
         for (row, depths) in self.depth.chunks_mut(self.width.max(1)).enumerate() {

@@ -4,6 +4,7 @@
 //! Everything is in the working frame: world axes, origin near the body.
 
 use crate::math::{LANES, Mat3, Points, Vec3, vectorized};
+use crate::observation::candidates::Candidates;
 use crate::shape::SurfaceBatch;
 
 /// Surface matches of one limb: measured points and their closest points. Rejected pairs are kept with weight zero.
@@ -140,6 +141,15 @@ impl LimbMatches {
         self.weight.reserve(len.saturating_sub(self.weight.len()));
         self.own.reserve(len.saturating_sub(self.own.len()));
         self.surface.reserve(len);
+    }
+
+    /// The surface for which a point stands, in patches: with the part of it by which the match is accepted, and with the points
+    /// that are not sampled.
+    pub(crate) fn area(&self, index: usize, candidates: &Candidates) -> f64 {
+        let precision = self.base_weight[index] / candidates.area[self.candidate[index] as usize];
+        let sampled = self.candidate.len() as f64 / (self.candidate.len() + self.left_out.len()) as f64;
+        // A weight that is too small for single precision is zero.
+        if precision > 0.0 { f64::from(self.weight[index] / precision) / sampled } else { 0.0 }
     }
 
     /// Sum of the weights, and weighted sum of the squared distances.

@@ -224,8 +224,12 @@ pub struct Surroundings<'a> {
 impl Surroundings<'_> {
     /// Whether a pixel with a depth of `z` meters shows the background or a person who is tracked already.
     pub fn explains(&self, index: usize, z: f32) -> bool {
-        let others = self.owners.get(index).is_some_and(|owner| *owner != NO_OWNER && Some(*owner) != self.own);
-        others || self.background.get(index).is_some_and(|depth| Background::contains(*depth, z))
+        self.is_others(index) || self.background.get(index).is_some_and(|depth| Background::contains(*depth, z))
+    }
+
+    /// Whether a pixel shows a person who is tracked already.
+    pub fn is_others(&self, index: usize) -> bool {
+        self.owners.get(index).is_some_and(|owner| *owner != NO_OWNER && Some(*owner) != self.own)
     }
 
     /// Whether a point of the world lies in one of the excluded boxes.

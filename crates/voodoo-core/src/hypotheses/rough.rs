@@ -62,13 +62,14 @@ impl RoughSearch {
     /// Sets the sample: unexplained points nearby, and the points that are matched to the arm or leg.
     pub(super) fn begin(&mut self, at: Extremity) {
         let Self { unexplained, sample, others, distances, .. } = self;
+        let candidates = at.objective.context.observation.candidates;
         sample.clear();
         sample.extend(&unexplained.points, &unexplained.weights);
         for limb in at.chain.limbs() {
             let matches = &at.objective.correspondences.limbs[limb];
-            for (index, weight) in matches.weight.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+            for index in (0..matches.weight.len()).filter(|index| matches.weight[*index] > 0.0) {
                 let point = matches.measured.get(index).to_array().map(|value| value as f32);
-                sample.push(point, f64::from(*weight));
+                sample.push(point, matches.area(index, candidates));
             }
         }
         sample.subsample(ROUGH_SAMPLE);

@@ -18,7 +18,8 @@ pub(crate) struct Candidates {
     pub points: Points,
     /// Weights.
     pub weight: Vec<f32>,
-    /// The surface for which each point stands, in patches: its weight, without the precision of a depth image.
+    /// The surface for which each pixel stands, in patches: its weight without the precision of the image. Points of clouds stand for
+    /// their weight.
     pub area: Vec<f32>,
     /// The limb they are known to be on, or [`ANY_LIMB`].
     pub limb: Vec<u16>,

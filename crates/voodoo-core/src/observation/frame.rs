@@ -421,7 +421,9 @@ fn check_relation(what: impl Display, site: usize, weight: f64, bias: f64, body:
 }
 
 fn check_weight(what: impl Display, weight: f64) -> Result<(), Unexpected> {
-    Unexpected::unless(weight.is_finite() && weight > 0.0, what, "a finite weight above zero", weight)
+    // Points are weighed in single precision.
+    let valid = (weight as f32).is_finite() && weight > 0.0;
+    Unexpected::unless(valid, what, "a weight above zero, 1e38 at most", weight)
 }
 
 /// What is expected of a position.

@@ -102,7 +102,7 @@ impl Segments {
                         continue;
                     }
                     let point = image.world_from_sensor * image.back_project(pixel, z) - views.origin;
-                    self.push(point, image.weight * spread * f64::from(z * z));
+                    self.push(point, spread * f64::from(z * z));
                 }
             }
         }

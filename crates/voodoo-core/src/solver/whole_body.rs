@@ -193,7 +193,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_hidden_limb_rests_as_soon_at_any_rate_of_frames() {
+    fn a_limb_that_may_have_moved_twice_as_far_goes_two_steps_to_rest() {
         let left = |time_scale: f64| 1.0 - to_rest(time_scale, TO_REST, 0.0);
         assert!((left(2.0) - left(1.0) * left(1.0)).abs() < 1e-12 && left(1e3) >= 0.0);
         assert_eq!(to_rest(4.0, TO_REST, 1.0), 0.0);

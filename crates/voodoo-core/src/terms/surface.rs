@@ -40,17 +40,12 @@ impl Term for Surface<'_> {
 }
 
 /// The cost of the points matched to a limb less that of unexplained points, at the poses where they were matched, nats. It counts
-/// the surface for which they stand, however precise they are.
+/// the surface for which pixels stand, however precise they are.
 pub(crate) fn cost_of_points(matches: &LimbMatches, candidates: &Candidates) -> f64 {
-    let LimbMatches { candidate, left_out, weight, base_weight, surface, .. } = matches;
-    let pairs = weight.iter().zip(base_weight).zip(candidate.iter().zip(&surface.signed_distance));
-    let cost = |((weight, base_weight), (candidate, distance)): ((&f32, &f32), (&u32, &f32))| {
-        // A weight that is too small for single precision is zero.
-        let kept = if *base_weight > 0.0 { weight / base_weight } else { 0.0 };
-        f64::from(candidates.area[*candidate as usize] * kept) * (unexplained(f64::from(*distance)) - PATCH)
-    };
-    let of_each = (candidate.len() + left_out.len()) as f64 / candidate.len().max(1) as f64;
-    of_each * pairs.map(cost).sum::<f64>()
+    let distances = matches.surface.signed_distance.iter().enumerate();
+    distances
+        .map(|(index, distance)| matches.area(index, candidates) * (unexplained(f64::from(*distance)) - PATCH))
+        .sum()
 }
 
 /// Cost of a point of weight one at this distance from the surface, nats.

@@ -56,7 +56,7 @@ fn a_body_that_sites_miss_by_far_is_not_tracked_whatever_depth_says() {
 fn the_precision_of_an_image_does_not_change_how_much_of_the_body_it_shows() {
     let (model, poses) = standing();
     let (truth, _) = crate::testing::raised(&model, &poses, 0.2);
-    for weight in [1.0, 0.05] {
+    for weight in [1.0, 0.05, 3.0] {
         let mut tracker = Tracker::new(model.body.clone(), Config::default()).unwrap();
         tracker.reset_pose(&poses).unwrap();
         for (frame, shown) in [&poses, &poses, &truth, &truth].into_iter().enumerate() {

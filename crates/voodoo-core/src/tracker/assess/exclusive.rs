@@ -6,12 +6,12 @@ use crate::math::{Points, Pose, reset, widest};
 use crate::observation::candidates::Candidates;
 use crate::visibility::EXPLAINED;
 
-/// Total weight of the exclusively explained candidates, and working memory.
+/// The surface for which the exclusively explained candidates stand, and working memory.
 #[derive(Debug, Default)]
 pub(super) struct Exclusive {
-    /// Total weight by limb.
-    pub(super) weight: Vec<f64>,
-    /// The part of `weight` from point clouds, that is, not from depth images.
+    /// That of each limb, in patches.
+    pub(super) area: Vec<f64>,
+    /// The part of `area` from point clouds, that is, not from depth images.
     pub(super) clouds: Vec<f64>,
     sample: Points,
     distances: Vec<f32>,
@@ -24,12 +24,12 @@ pub(super) struct Exclusive {
 }
 
 impl Exclusive {
-    /// Recomputes the weights for these poses and candidates.
+    /// Recomputes them for these poses and candidates.
     pub(super) fn count(&mut self, body: &Body, poses: &[Pose], candidates: &Candidates) {
-        let Self { weight, clouds, sample, distances, all, nearest, least, near } = self;
+        let Self { area, clouds, sample, distances, all, nearest, least, near } = self;
         let count = poses.len();
         let pixels = candidates.cameras.last().map_or(0, |(end, _)| *end as usize);
-        reset(weight, count, 0.0);
+        reset(area, count, 0.0);
         reset(clouds, count, 0.0);
         let step = (candidates.len() / ROUGH_SAMPLE).max(1);
         let points = &candidates.points;
@@ -69,7 +69,7 @@ impl Exclusive {
             };
             if near[place] == 1 || (0..count).find(rival).is_none() {
                 let candidate = f64::from(candidates.area[place * step]) * step as f64;
-                weight[closest] += candidate;
+                area[closest] += candidate;
                 clouds[closest] += if place * step < pixels { 0.0 } else { candidate };
             }
         }
@@ -83,8 +83,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::testing::{before_wall, first_arm, moved, raised, standing, with_context, without_background};
 
-    /// Weight of the candidates that each limb explains exclusively, for an image of `truth` and a body at `poses`, and the
-    /// weight of all candidates.
+    /// The surface that each limb explains exclusively, for an image of `truth` and a body at `poses`, and that of all candidates.
     fn counted(truth: &[Pose], poses: &[Pose], change: impl Fn(&Candidates, &mut Exclusive)) -> (Vec<f64>, f64) {
         let (model, config) = (standing().0, without_background());
         with_context(&before_wall(&model.body, truth), &config, &model, poses, |context| {
@@ -94,8 +93,7 @@ mod tests {
             exclusive.count(&model.body, poses, candidates);
             exclusive.count(&model.body, poses, candidates);
             change(candidates, &mut exclusive);
-            let all = candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
-            (exclusive.weight, all)
+            (exclusive.area, candidates.area())
         })
     }
 

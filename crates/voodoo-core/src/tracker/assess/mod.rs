@@ -195,7 +195,7 @@ impl Assessor {
             let support = &mut self.supports[limb];
             let patches = support.patches;
             let visible = patches.front_facing - patches.occluded;
-            let exclusive = self.exclusive.weight[limb];
+            let exclusive = self.exclusive.area[limb];
             let unseen = patches.front_facing == 0.0;
             // Evidence for the limb, evidence against it and its unoccluded part, as fractions of its surface.
             let mut now = if unseen {
