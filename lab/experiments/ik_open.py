@@ -60,7 +60,7 @@ def left_open(sequence: Rendered, views: int) -> dict[str, np.ndarray]:
                 places.append(place)
             if np.isfinite(costs[0]):  # where the truth itself is not allowed, there is nothing to compare with
                 found[joint].append(scatter(np.array(places), np.array(costs) <= costs[0] + CONTENT_PX))
-    return {joint: np.array(values) for joint, values in found.items()}
+    return {joint: np.array(values) for joint, values in found.items() if values}
 
 
 def turned(
