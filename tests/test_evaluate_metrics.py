@@ -3,6 +3,7 @@ import pytest
 
 from scene import turn
 from voodoo.evaluation import metrics
+from voodoo.measurements import nearest_stamps
 
 STAMPS = np.arange(60) / 30.0
 
@@ -158,6 +159,21 @@ def test_match_takes_the_nearest_stamp_within_tolerance():
     )
     assert matched[:, 0, 0].tolist()[1:4] == [0.0, 1.0, 2.0]
     assert np.isnan(matched[[0, 4]]).all()
+
+
+def test_the_nearest_of_stamps_in_any_order_is_the_first_of_equal_ones():
+    rng = np.random.default_rng(5)
+    for count in (1, 2, 7, 60):
+        stamps, times = rng.integers(0, 40, count) / 8.0, rng.integers(-40, 360, 200) / 64.0
+        away = np.abs(stamps - times[:, None])
+        expected = np.where(away.min(axis=1) <= 0.25, away.argmin(axis=1), -1)
+        ties = (away == away.min(axis=1)[:, None]).sum(axis=1) > 1
+        found = nearest_stamps(stamps, times, within=0.25)
+        assert (found == expected)[~ties].all()
+        assert (stamps[found[ties]] <= stamps[expected[ties]]).all() and (found >= 0).tolist() == (
+            expected >= 0
+        ).tolist()
+    assert nearest_stamps(np.array([]), [1.0], within=9.0).tolist() == [-1]
 
 
 def test_twelve_joints():

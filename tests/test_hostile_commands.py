@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -122,9 +123,12 @@ def test_ctrl_c_ends_an_evaluation_at_once_and_keeps_what_is_done(tmp_path):
     with subprocess.Popen(
         command, cwd=tmp_path, stdout=pipe, stderr=pipe, text=True, start_new_session=True, env={**os.environ}
     ) as running:
+        late = threading.Timer(60.0, os.killpg, (running.pid, signal.SIGKILL))
+        late.start()
         for line in running.stderr:
             if "evaluating: " in line:  # a recording is done
                 break
+        late.cancel()
         began = time.perf_counter()
         os.killpg(running.pid, signal.SIGINT)  # as a terminal does: the workers get it, too
         try:

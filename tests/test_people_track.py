@@ -320,7 +320,7 @@ shape = { length = 0.2, a0 = 0.10, b0 = 0.10, a1 = 0.08, b1 = 0.08 }
 
 REFUSED = {
     "`--init FILE`": ("init: expected none", ("--init", "start.json")),
-    "`--draw-regions`, `--background`": ("draw-regions: expected none with", ("--draw-regions", "--overlay", "o")),
+    "`--draw-regions`, `--background`": ("draw-regions: expected none with", ("--draw-regions",)),
     "a body that the detector does not know": (
         "by depth alone the body 'lamp' is not found",
         ("--body", "lamp.toml"),

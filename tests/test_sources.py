@@ -24,7 +24,7 @@ from voodoo.recordings import (
     sample_path,
 )
 from voodoo.recordings.keypoint_layouts import layout_of
-from voodoo.sensors.adapters.base import Context, Memory
+from voodoo.sensors.adapters.depth import DepthAdapter
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.pixels import in_sensor
@@ -361,14 +361,17 @@ def test_what_is_out_of_a_cameras_range_is_not_used():
     assert counts[7.5] > 500 and counts[1.0] == 0
 
 
-def test_what_is_out_of_a_cameras_range_is_not_behind_a_keypoint():
-    frame = next(iter(open_recording(sample_path())))
+def test_what_is_out_of_a_cameras_range_is_not_behind_a_keypoint(monkeypatch):
+    seen = []
+    monkeypatch.setattr(
+        DepthAdapter, "add", lambda self, frame, item, context: seen.append((item, context.depth_images))
+    )
+    recorded = next(iter(open_recording(sample_path())))
     for farthest, returns in ((7.5, True), (1.0, False)):
         settings = FrontEndSettings(use=("depth", "keypoints"), depth_filter=DepthFilter(farthest=farthest))
-        tracker = voodoo.Tracker(voodoo.Body.human())
-        context = Context(frame.stamp, frame.measurements, {}, settings, tracker, SiteGate(), Memory())
-        (depth,) = context.depth_images
-        assert bool(depth.image.any()) is returns
+        FrontEnd(voodoo.Tracker(voodoo.Body.human()), settings=settings).frame(recorded)
+        item, others = seen.pop()
+        assert [item] == others and bool(item.image.any()) is returns
 
 
 def test_a_laser_alone_is_lost_although_it_matches():

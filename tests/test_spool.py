@@ -181,7 +181,7 @@ def test_a_recording_whose_channel_has_no_schema_is_named_and_kept(tmp_path):
     assert done == [] and isinstance(error, VoodooError) and str(bag.parents[1]) in str(error) and bag.exists()
 
 
-@pytest.mark.parametrize(("command", "name"), [("track", "SIGTERM"), ("track", "SIGHUP"), ("live", "SIGHUP")])
+@pytest.mark.parametrize(("command", "name"), [("track", "SIGINT"), ("track", "SIGTERM"), ("live", "SIGHUP")])
 def test_every_signal_ends_a_command_with_what_there_is(tmp_path, command, name):
     """For others of live see test_live_command.py."""
     words = ("--overlay", "look.mp4") if command == "track" else ("--loop",)

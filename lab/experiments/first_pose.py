@@ -15,17 +15,16 @@ in their first frame are left out. A row for exact truth and one for reference s
 
 import argparse
 import multiprocessing
-import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 import voodoo
 from voodoo.evaluation import metrics
+from voodoo.evaluation.evaluate import use_one_thread
 from voodoo.evaluation.search import find_recordings
 from voodoo.names import SEARCHING
 from voodoo.pipeline.run import track
@@ -120,14 +119,8 @@ def poses_of(paths: Sequence[Path], jobs: int) -> Iterator[First]:
     if jobs == 1:
         yield from (pose for pose in map(first, paths) if pose is not None)
         return
-    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), initializer=_one_thread) as pool:
+    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), initializer=use_one_thread) as pool:
         yield from (pose for pose in pool.map(first, paths, chunksize=4) if pose is not None)
-
-
-def _one_thread() -> None:
-    """In a worker: the processes are the parallelism."""
-    os.environ["RAYON_NUM_THREADS"] = "1"
-    cv2.setNumThreads(1)
 
 
 def main() -> None:

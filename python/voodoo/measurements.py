@@ -200,11 +200,20 @@ def usual_interval(stamps: FloatArray) -> float:
     return float(np.median(np.diff(stamps))) if len(stamps) > 1 else 1.0 / ASSUMED_RATE_HZ
 
 
-def nearest_stamp(stamps: FloatArray, stamp: float, *, within: float) -> int:
-    """Index of the stamp that is nearest to a time, the first one of several; -1 if it is farther than `within` [s]."""
-    away = np.abs(stamps - stamp)
-    index = int(away.argmin())
-    return index if away[index] <= within else -1
+def nearest_stamps(stamps: FloatArray, times: npt.ArrayLike, *, within: float) -> npt.NDArray[np.intp]:
+    """Index (M,) of the stamp (of N, in any order) that is nearest to each time (M,), the first one of several; -1 if it is
+    farther than `within` [s]."""
+    times = np.asarray(times, dtype=np.float64)
+    if not len(stamps):
+        return np.full(len(times), -1, dtype=np.intp)
+    order = np.argsort(stamps, kind="stable")
+    rising = stamps[order]
+    after = np.searchsorted(rising, times).clip(max=len(rising) - 1)
+    before = np.maximum(after - 1, 0)
+    near = np.where(np.abs(times - rising[before]) <= np.abs(rising[after] - times), before, after)
+    # Of equal stamps the first one.
+    near = np.searchsorted(rising, rising[near])
+    return np.where(np.abs(rising[near] - times) <= within, order[near], -1)
 
 
 class Measurement(Protocol):

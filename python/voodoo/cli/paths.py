@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +43,6 @@ def check_paths(context: typer.Context, default: Sequence[Path] = ()) -> None:
     Raises:
         VoodooError: see `voodoo.whole.check_outputs`.
     """
-    from voodoo.export.files import ONE_PERSON
     from voodoo.whole import check_outputs
 
     outputs, inputs = list(default), []
@@ -58,5 +57,10 @@ def check_paths(context: typer.Context, default: Sequence[Path] = ()) -> None:
                 inputs += [Path(part) for word in words for part in (word, *re.split("[=:]", word, maxsplit=1)[1:])]
     folders = {folder for path in inputs for folder in (path.parent, path.parent.parent)}
     inputs += [folder / name for folder in sorted(folders) for name in _BESIDE]
-    several = context.params.get("people") not in (None, "1")
-    check_outputs(outputs, inputs, numbered=ONE_PERSON if several else ())
+    numbered: Container[str] = ()
+    if context.params.get("people") not in (None, "1"):
+        # Loaded where it is needed: a command without outputs starts in half of the time.
+        from voodoo.export.files import ONE_PERSON
+
+        numbered = ONE_PERSON
+    check_outputs(outputs, inputs, numbered=numbered)

@@ -125,10 +125,10 @@ def track_command(
     refuse_both("--view", view or None, **{"--save": save})
     if offset and not with_:
         raise typer.BadParameter("--offset is for the stamps of --with, give both")
-    if draw_regions and overlay is None:
-        raise typer.BadParameter("--draw-regions is for --overlay, give both")
     start, layout, left_out = ParsedTracking.of(tracking), reading.layout, None if strict else LeftOut()
     several, bare = start.limit != 1, start.beginning is not None
+    if draw_regions and overlay is None and not several:
+        raise typer.BadParameter("--draw-regions is for --overlay, give both")
     markers = None if marker_map is None else MarkerMap.load(marker_map)
     numbers, others = options.numbers_of(reading.option), with_ or ()
     about: dict[str, Any] = {"markers": markers, "layout": layout, "numbers": numbers}

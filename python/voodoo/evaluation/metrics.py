@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.measurements import ROUNDED_S, FloatArray, nearest_stamp, usual_interval
+from voodoo.measurements import ROUNDED_S, FloatArray, nearest_stamps, usual_interval
 from voodoo.recordings.keypoint_layouts import LIMBS
 
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
@@ -51,7 +51,7 @@ def match_reference(
 
     They are not interpolated, because a reference with the frames' rate has one value for every frame.
     """
-    index = np.array([nearest_stamp(reference_stamps, stamp, within=tolerance) for stamp in stamps], dtype=np.intp)
+    index = nearest_stamps(reference_stamps, stamps, within=tolerance)
     matched = positions[index].astype(np.float64)
     matched[index < 0] = np.nan
     return matched

@@ -20,7 +20,7 @@ import voodoo._core as _core
 from voodoo.errors import VoodooError, installed
 from voodoo.evaluation import metrics
 from voodoo.export.table import Arrays
-from voodoo.measurements import FloatArray, nearest_stamp
+from voodoo.measurements import FloatArray, nearest_stamps
 from voodoo.recordings.people_truth import PeopleTruth
 
 MATCH_M = 0.5
@@ -196,7 +196,7 @@ _Indices: TypeAlias = npt.NDArray[np.int64]
 def _frames(truth: PeopleTruth, rows: Arrays) -> tuple[FloatArray, _Indices, list[_Indices]]:
     """Stamps, the truth's row and the result's rows of each frame, see Matches."""
     own, row = np.unique(rows["stamps"], return_inverse=True)
-    near = np.array([nearest_stamp(truth.stamps, stamp, within=SAME_TIME_S) for stamp in own], dtype=np.intp)
+    near = nearest_stamps(truth.stamps, own, within=SAME_TIME_S)
     same = near >= 0
     if len(own) and not same.any():
         raise VoodooError(

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import VoodooError, a_path, columns_in, naming, reading
-from voodoo.measurements import FloatArray as FloatArray
+from voodoo.measurements import FloatArray
 from voodoo.stored import MOST_RECORDED, check_stored, numbers_in
 from voodoo.unpacking import stored_arrays
 from voodoo.whole import appearing_whole

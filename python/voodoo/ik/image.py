@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 import voodoo._core as _core
-from voodoo.drawing.ink import SUBPIXEL
 from voodoo.errors import MeasurementError, of_kind
 from voodoo.ik.values import numbers
 from voodoo.model.camera import Camera, pixels_seen
@@ -21,6 +20,7 @@ _MIDDLE = 0.3
 """A pixel belongs to the medial axis if no step of one pixel increases the distance by more than the step minus this value; a
 smaller value gives more such pixels."""
 _WIDEST = 1000.0
+_SUBPIXEL_BITS = 4
 
 
 class Silhouette:
@@ -135,9 +135,9 @@ def local_thickness(distance: npt.NDArray[np.float32]) -> npt.NDArray[np.float32
     rows, columns = np.nonzero(middle)
     radii = inside[rows, columns]
     order = np.argsort(radii, kind="stable")
-    one = 1 << SUBPIXEL
+    one = 1 << _SUBPIXEL_BITS
     for u, v, radius in zip(columns[order].tolist(), rows[order].tolist(), radii[order].tolist(), strict=True):
-        cv2.circle(thickness, (u * one, v * one), round(radius * one), radius, cv2.FILLED, shift=SUBPIXEL)
+        cv2.circle(thickness, (u * one, v * one), round(radius * one), radius, cv2.FILLED, shift=_SUBPIXEL_BITS)
     return np.where(inside > 0.0, np.maximum(thickness, inside), np.float32(0.0)).astype(np.float32)
 
 

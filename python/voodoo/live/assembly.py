@@ -15,7 +15,7 @@ from voodoo.errors import RecordingError, VoodooError
 from voodoo.live.source import Arrival, Faults
 from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.model.camera import Camera
-from voodoo.pipeline.frozen import STRIDE, unchanged
+from voodoo.pipeline.frozen import unchanged
 from voodoo.pipeline.pairing import WAIT_S
 from voodoo.recordings.recording import refuse_blank
 
@@ -23,6 +23,7 @@ GAP_S = 1.0
 """After this time without a measurement, persons have moved and the search starts again."""
 _PASSED = 0.25
 """If stamps advance by more than a gap while less than this fraction of it has elapsed, the clock was set ahead."""
+_STRIDE = 16
 
 
 @dataclass(frozen=True)
@@ -274,7 +275,7 @@ class Assembler:
     def _refuse_far(self, item: DepthImage) -> None:
         if item.image.dtype.kind != "f":
             return
-        observed = item.image[::STRIDE, ::STRIDE]
+        observed = item.image[::_STRIDE, ::_STRIDE]
         meters = observed[np.isfinite(observed) & (observed > 0.0)] * item.meters_per_unit
         if meters.size and float(np.median(meters)) > _FAR_M:
             where, found = f"{item.sensor}, stamp {item.stamp:.6f}", f"a median of {np.median(meters):.0f}"

@@ -16,7 +16,7 @@ import numpy as np
 
 import voodoo._core as _core
 from voodoo._core import Estimate, Frame
-from voodoo.measurements import RecordedFrame
+from voodoo.measurements import DepthImage, RecordedFrame
 from voodoo.model.body import Body
 from voodoo.names import SEARCHING
 from voodoo.people import ONE, Followed, People, PeopleEstimate, everybody
@@ -158,6 +158,8 @@ class FrontEnd(Generic[E]):
         clothes = not alone and self.settings.clothes and cast(People, self.tracker).needs_color
         unused = not (alone or clothes or ("skin" in use and self.settings.skin.each))
         alive = self._frozen.without(recorded.measurements, use=use, idle=lambda item: unused and _is_colored(item))
+        if self.settings.depth_filter is not None and "depth" in use:
+            alive = [self.settings.filtered(item) if isinstance(item, DepthImage) else item for item in alive]
         self._alive = alive
         used = [
             item

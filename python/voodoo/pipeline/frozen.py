@@ -11,7 +11,8 @@ import numpy.typing as npt
 from voodoo.measurements import Measurement
 from voodoo.sensors.adapters import adapters_of
 
-STRIDE = 16
+_STRIDE = 16
+"""Every n-th row of an array is compared first."""
 
 
 class FrozenSensors:
@@ -64,7 +65,7 @@ class FrozenSensors:
 
 def unchanged(before: npt.NDArray[Any], content: npt.NDArray[Any]) -> bool:
     """Whether measured data are bit by bit those before."""
-    known, some = {"equal_nan": content.dtype.kind == "f"}, slice(None, None, STRIDE)
+    known, some = {"equal_nan": content.dtype.kind == "f"}, slice(None, None, _STRIDE)
     # Noise makes the first rows differ, so that all are seldom compared.
     alike = before.shape == content.shape and np.array_equal(before[some], content[some], **known)
     return alike and np.array_equal(before, content, **known)

@@ -33,6 +33,8 @@ _CONFIDENT = 0.3
 _FEWEST = 20
 """Distances, or limbs, that a judgment needs."""
 _FEWEST_OF_A_PERSON = 5
+_PARALLEL = 0.05**2
+"""Squared sine of the angle between two rays below which their distance says nothing."""
 _OUTSIDE, _MOST_OUTSIDE = 0.05, 0.1
 """Networks guess joints a little outside of a picture: by this share of its size, and this share of the keypoints."""
 _INSTANTS = 8
@@ -158,7 +160,7 @@ def agreement(instants: Sequence[Instant], change: Change = lambda at, _: at, *,
                 continue
             for one in few:
                 # Networks list people in any order: the other camera's person is the one whose rays pass nearest.
-                met = [passing(*one, *other) for other in many]
+                met = [passing(*one, *other, parallel=_PARALLEL) for other in many]
                 met = [each for each in met if len(each[0]) >= _FEWEST_OF_A_PERSON]
                 if met:
                     away, places, _ = min(met, key=lambda each: float(np.median(each[0])))

@@ -13,7 +13,7 @@ from typing import TypedDict, TypeVar
 import numpy as np
 
 from voodoo.errors import RecordingError
-from voodoo.measurements import ByteImage, DepthImage, FloatArray, Measurement, RecordedFrame, nearest_stamp
+from voodoo.measurements import ByteImage, DepthImage, FloatArray, Measurement, RecordedFrame, nearest_stamps
 from voodoo.model.joint import short
 from voodoo.model.standing import is_optical
 from voodoo.recordings.empty_scene import EmptyScene
@@ -57,7 +57,7 @@ class Reference:
 
     def at(self, stamp: float, names: Sequence[str], *, within: float) -> dict[str, FloatArray]:
         """The known positions (3,) of some joints nearest to a time, if they are within so many seconds; else none."""
-        index = nearest_stamp(self.stamps, stamp, within=within)
+        index = int(nearest_stamps(self.stamps, [stamp], within=within)[0])
         if index < 0:
             return {}
         row = {name: self.positions[index, self.names.index(name)] for name in names if name in self.names}
@@ -286,10 +286,10 @@ def usable(
 
 
 _NUMBERS = {
-    "rate": ("images per second > 0", 1e4), "meters_per_unit": ("a length > 0", 1e3),
-    "tf_max_age": ("seconds >= 0", math.inf), "unpacked_gb": ("gigabytes > 0", 1e6),
+    "rate": ("images per second > 0", False, 1e4), "meters_per_unit": ("a length > 0", False, 1e3),
+    "tf_max_age": ("seconds >= 0", True, math.inf), "unpacked_gb": ("gigabytes > 0", False, 1e6),
 }  # fmt: skip
-"""Options of loaders that are numbers: what is expected, and the greatest one."""
+"""Options of loaders that are numbers: what is expected, whether it may be zero, and the greatest one."""
 
 
 def number_option(path: object, name: str, value: object) -> float:
@@ -298,12 +298,12 @@ def number_option(path: object, name: str, value: object) -> float:
     Raises:
         RecordingError: it is out of range; names the option and what was expected.
     """
-    expected, most = _NUMBERS[name]
+    expected, zero, most = _NUMBERS[name]
     try:
         number = float(value) if not isinstance(value, str) else math.nan  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
         number = math.nan
-    if not (0.0 < number <= most or (number == 0.0 and "=" in expected)):
+    if not (0.0 < number <= most or (number == 0.0 and zero)):
         raise RecordingError(f"{path}: {name}: expected {expected}, found {short(value)}")
     return number
 

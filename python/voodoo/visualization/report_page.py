@@ -18,9 +18,8 @@ import numpy as np
 
 from voodoo.errors import VoodooError, installed
 from voodoo.export.skeleton import mean_interval
-from voodoo.export.table import FloatArray
 from voodoo.export.track import Track
-from voodoo.measurements import ASSUMED_RATE_HZ
+from voodoo.measurements import ASSUMED_RATE_HZ, FloatArray
 from voodoo.recordings.videos import opened_video
 
 _LINES = (

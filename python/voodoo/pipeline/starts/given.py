@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from voodoo.export.track import Track
-from voodoo.measurements import ROUNDED_S, nearest_stamp, usual_interval
+from voodoo.measurements import ROUNDED_S, nearest_stamps, usual_interval
 from voodoo.pipeline.starts.base import FoundStart, StartFinder, StartFrame, fixes_pose
 
 _SAME_TIME_S = 0.02
@@ -51,13 +51,13 @@ class EarlierStart(StartFinder):
 
     def __init__(self, result: Track) -> None:
         """Keep the reliable frames."""
-        self._near = min(_SAME_TIME_S, 0.5 * usual_interval(result.stamps))
+        self._near = min(_SAME_TIME_S, 0.5 * usual_interval(result.stamps)) if len(result) > 1 else _SAME_TIME_S
         self._result = result.of_frames(np.array([word in _USABLE for word in result.status], dtype=bool))
 
     def find(self, frame: StartFrame) -> Sequence[FoundStart]:
         """See StartFinder."""
         result = self._result
-        row = nearest_stamp(result.stamps, frame.stamp, within=self._near) if len(result) else -1
+        row = int(nearest_stamps(result.stamps, [frame.stamp], within=self._near)[0])
         if row < 0:
             return []
         pairs = zip(result.joint_names, result.joints[row], strict=True)

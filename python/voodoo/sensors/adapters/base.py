@@ -73,7 +73,8 @@ class Context:
 
     Attributes:
         stamp: of the frame [s].
-        measurements: all measurements of the frame, without those of frozen sensors.
+        measurements: all measurements of the frame, without those of frozen sensors; depth images without the pixels that the
+            settings remove.
         predicted: site name -> predicted position (3,) at the frame's time [m], root frame; empty while no person is tracked.
         settings: settings of the front end.
         tracker: the tracker before the step; its estimate is the last one.
@@ -117,10 +118,10 @@ class Context:
 
     @cached_property
     def depth_images(self) -> list[DepthImage]:
-        """The depth images of the frame, filtered if the settings say so, if depth is used."""
+        """The depth images of the frame, if depth is used."""
         if "depth" not in self.settings.use:
             return []
-        return [self.settings.filtered(item) for item in self.measurements if isinstance(item, DepthImage)]
+        return [item for item in self.measurements if isinstance(item, DepthImage)]
 
     def range_weight(self, noise: RangeNoise | None, sharing: float, root_from_sensor: FloatArray) -> float:
         """Weight of a range at the body's distance from a sensor, 3 m while no person is tracked; 1 if `noise` is None."""

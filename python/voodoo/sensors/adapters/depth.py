@@ -14,7 +14,7 @@ from voodoo.sensors.adapters.base import Adapter, Context, Memory
 
 
 class DepthAdapter(Adapter[DepthImage]):
-    """Depth images, filtered if the settings say so."""
+    """Depth images."""
 
     kind = "depth"
     measurement = DepthImage
@@ -26,7 +26,7 @@ class DepthAdapter(Adapter[DepthImage]):
         """As a depth image, weighted for the distance of the body."""
         chosen = context.settings
         frame.add_depth(
-            chosen.filtered(item).image,
+            item.image,
             camera=item.camera,
             meters_per_unit=item.meters_per_unit,
             world_from_sensor=item.root_from_sensor,
