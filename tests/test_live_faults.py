@@ -149,8 +149,8 @@ def all_nan(bus):
 
 
 def millimeters(bus):
-    for _ in range(3):
-        bus.bad(1, image=bus.images[bus.at].image.astype(np.float32), meters_per_unit=1.0)
+    for dtype in (np.float32, np.uint16, np.float32):
+        bus.bad(1, image=bus.images[bus.at].image.astype(dtype), meters_per_unit=1.0)
 
 
 def another_size(bus):

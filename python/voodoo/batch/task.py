@@ -29,7 +29,7 @@ from voodoo.people import PeopleEstimate, everybody
 from voodoo.pipeline.inputs import pictures_alone
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import AUTO, start_people, start_tracker
-from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.left_out import LeftOut, no_frame
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.settings import FrontEndSettings
@@ -217,7 +217,7 @@ def _track(job: Job, path: Path) -> tuple[Row, list[Columns]]:
         for one, own in part.items():
             found.setdefault(one, []).append(own if job.report else joined([own]))  # what only a page shows is large
     if one_only and not columns:
-        raise RecordingError(f"{job.source}: expected at least one frame that can be used, found none")
+        raise RecordingError(no_frame(job.source, left_out))
     if job.report:
         counts = {} if left_out is None else left_out.counts
         by_person = {f"person {one}": replace(Track.joined(own), left_out=counts) for one, own in found.items()}

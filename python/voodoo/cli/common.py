@@ -27,7 +27,7 @@ EXIT_CODES = {
     0: "success; of a command that tracks: at least one pose",
     FAILED: "refused or failed; one line names what was expected and found",
     2: "a wrong option",
-    NO_POSE: "no pose: nothing could be used, or nobody was found; files that tell so are written",
+    NO_POSE: "no pose: nobody was found, and files tell so, or no frame could be used",
     INTERRUPTED: "ended by Ctrl-C (128 + SIGINT); the frames up to there are written",
     143: "ended by SIGTERM (128 + 15), as by Ctrl-C",
     129: "ended by SIGHUP (128 + 1), as by Ctrl-C",

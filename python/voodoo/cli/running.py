@@ -29,7 +29,7 @@ from voodoo.measurements import ASSUMED_RATE_HZ
 from voodoo.pipeline.floor import visible_floor
 from voodoo.pipeline.run import TrackedFrame
 from voodoo.pipeline.start import AUTO, Beginning, beginning_of, start_people, start_tracker
-from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.left_out import LeftOut, no_frame
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.depth import DepthFilter
@@ -299,10 +299,7 @@ def run(
                 raise
             failures.append(error)
     if not seconds:
-        raise NoPoseError(
-            f"{source.name}: expected at least one frame that can be used, found none: {left_out or 'it is empty'}"
-            + (f" (the first: {next(iter(left_out.first.values()))})" if left_out else "")
-        )
+        raise NoPoseError(no_frame(source.name, left_out))
     outputs = [(path, output.failure) for path, output in ((overlay, writer), (save, viewer)) if output is not None]
     failures += [failure for _, failure in outputs if failure is not None]
     done = [path for path, failure in outputs if path is not None and failure is None]

@@ -273,10 +273,8 @@ class Assembler:
         return item
 
     def _refuse_far(self, item: DepthImage) -> None:
-        if item.image.dtype.kind != "f":
-            return
         observed = item.image[::_STRIDE, ::_STRIDE]
         meters = observed[np.isfinite(observed) & (observed > 0.0)] * item.meters_per_unit
         if meters.size and float(np.median(meters)) > _FAR_M:
             where, found = f"{item.sensor}, stamp {item.stamp:.6f}", f"a median of {np.median(meters):.0f}"
-            raise RecordingError(f"{where}: expected meters, found {found}", reason="wrong unit")
+            raise RecordingError(f"{where}: expected depths below {_FAR_M:.0f} m, found {found} m", reason="wrong unit")

@@ -199,7 +199,7 @@ class Upright:
                 self._sight.observe(step.frame)
             if len(self._sight.planes) >= _SIGHTS and (floor := self._sight.floor) is not None:
                 self._turn, self._sight = by_floor(floor, optical=True), None
-                self._live.faults.log(f"outputs are turned upright {self._turn.words}")
+                self._live.faults.log(f"outputs but .csv and .npz are turned upright {self._turn.words}")
         if len(self._estimates) == 2 * _SIGHTS and (words := lying_words(Track.of(self._estimates), root, self._turn)):
             self._live.faults.log(words)
         return self._turn

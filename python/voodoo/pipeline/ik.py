@@ -148,7 +148,9 @@ def follow(
             errors = {name: float(np.linalg.norm(posture.joints[name] - place)) for name, place in truth.items()}
             yield Solved(_track(recorded.stamp, posture), errors, time.perf_counter() - began)
         if regions is not None and not any_images:
-            raise VoodooError(f"{recording.name}: expected color pictures, found none; --pictures says where to look")
+            raise VoodooError(
+                f"{recording.name}: expected color pictures, found none; --pictures says where to look, or none"
+            )
 
     return solved()
 
@@ -201,7 +203,9 @@ def _masks(recording: Recording, positions: Reference, known: Sequence[str], pic
                 )
                 colors.setdefault(item.sensor, []).append((item.image, there))
     if not depths and not colors:
-        raise VoodooError(f"{recording.name}: expected {pictures} pictures, found none; --pictures says where to look")
+        raise VoodooError(
+            f"{recording.name}: expected {pictures} pictures, found none; --pictures says where to look, or none"
+        )
     level = recording.root_frame in LEVEL_FRAMES
     masks: dict[str, _MaskOf] = {
         name: partial(from_depth, scene=StillScene(images), level=level) for name, images in depths.items()

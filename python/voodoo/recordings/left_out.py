@@ -9,6 +9,12 @@ from copy import deepcopy
 from voodoo.errors import RecordingError, VoodooError
 
 
+def no_frame(name: str, left_out: LeftOut | None) -> str:
+    """What is said of a recording of which no frame could be used, and why."""
+    first = f" (the first: {next(iter(left_out.first.values()))})" if left_out else ""
+    return f"{name}: expected at least one frame that can be used, found none: {left_out or 'it is empty'}{first}"
+
+
 class LeftOut:
     """Unusable measurements, counted by reason.
 
