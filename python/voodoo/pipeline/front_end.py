@@ -16,7 +16,7 @@ import numpy as np
 
 import voodoo._core as _core
 from voodoo._core import Estimate, Frame
-from voodoo.measurements import DepthImage, RecordedFrame
+from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
 from voodoo.names import SEARCHING
 from voodoo.people import ONE, Followed, People, PeopleEstimate, everybody
@@ -158,9 +158,7 @@ class FrontEnd(Generic[E]):
         clothes = not alone and self.settings.clothes and cast(People, self.tracker).needs_color
         unused = not (alone or clothes or ("skin" in use and self.settings.skin.each))
         alive = self._frozen.without(recorded.measurements, use=use, idle=lambda item: unused and _is_colored(item))
-        if self.settings.depth_filter is not None and "depth" in use:
-            alive = [self.settings.filtered(item) if isinstance(item, DepthImage) else item for item in alive]
-        self._alive = alive
+        self._alive = alive = [self._ready(item) for item in alive]
         used = [
             item
             for item in alive
@@ -202,6 +200,13 @@ class FrontEnd(Generic[E]):
             spare = [] if persons and not self._lost else used
         detected = self._detect(frame, spare)
         return frame, {number: own[number] for number in sorted(filled)}, detected
+
+    def _ready(self, item: Any) -> Any:  # noqa: ANN401 - a measurement of any kind
+        """A measurement as its adapters use it."""
+        for adapter in adapters_of(item):
+            if adapter.kind in self.settings.use:
+                item = adapter.ready(item, self.settings)
+        return item
 
     def _contexts(self, stamp: float) -> dict[int, Context]:
         """What the adapters may read about every person who is tracked."""

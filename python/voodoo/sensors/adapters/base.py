@@ -180,6 +180,10 @@ class Adapter(ABC, Generic[M]):
             MeasurementError: it cannot be used.
         """
 
+    def ready(self, item: M, settings: FrontEndSettings) -> M:
+        """The measurement as it is used, once a frame: by default unchanged."""
+        return item
+
     def shares(self, item: M, persons: Mapping[int, Context]) -> Mapping[int, M]:
         """The part of a measurement that belongs to each of several persons.
 

@@ -11,6 +11,7 @@ from voodoo._core import Frame
 from voodoo.drawing.surfaces import Log, every, grown
 from voodoo.measurements import DepthImage
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
+from voodoo.sensors.settings import FrontEndSettings
 
 
 class DepthAdapter(Adapter[DepthImage]):
@@ -21,6 +22,10 @@ class DepthAdapter(Adapter[DepthImage]):
     measured = "image"
     panel = 0
     while_searching = True
+
+    def ready(self, item: DepthImage, settings: FrontEndSettings) -> DepthImage:
+        """Without the pixels that the settings remove."""
+        return settings.filtered(item)
 
     def add(self, frame: Frame, item: DepthImage, context: Context) -> None:
         """As a depth image, weighted for the distance of the body."""
