@@ -1,10 +1,14 @@
 """Reference pages that are generated from the package, so that they cannot disagree with it.
 
 A page says where by a line of its own, `% generated: NAME`; the line is replaced by Markdown when the page is read.
+A file of the repository's root replaces the whole page.
+A public name in an item of a list becomes its documentation, with all members, those that follow it, or "(attributes)" alone.
 """
 
 from __future__ import annotations
 
+import importlib
+import inspect
 import re
 import textwrap
 from pathlib import Path
@@ -22,6 +26,7 @@ if TYPE_CHECKING:
 WIDTH = 80
 ROOT = Path(__file__).resolve().parents[2]
 MARK = re.compile(r"^% generated: (\S+)$", re.MULTILINE)
+PUBLIC = re.compile(r"^- `(voodoo\.[\w.]+)`(?:: (`.+`)| \((attributes)\))?$", re.MULTILINE)
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\((?!https?:|#)([^)]*)\)")
 LAB = re.compile(r"\[([^\]]*)\]\((?:\.\./)+lab/([^)#]*)[^)]*\)")
 """Links to what is no page: they stay as the file's name."""
@@ -133,12 +138,25 @@ def project_file(name: str) -> str:
     return LINK.sub(link, (ROOT / name).read_text(encoding="utf-8"))
 
 
+def documented(item: re.Match[str]) -> str:
+    """The directive that documents a public name."""
+    module, _, name = item[1].rpartition(".")
+    public = getattr(importlib.import_module(module), name)
+    kind = "function" if inspect.isfunction(public) else "class" if inspect.isclass(public) else "module"
+    lines = [f".. auto{kind}:: {item[1]}"]
+    if kind == "module" or (kind == "class" and not issubclass(public, (tuple, BaseException)) and not item[3]):
+        lines += [f"   :members: {(item[2] or '').replace('`', '')}".rstrip(), "   :exclude-members: model_config"]
+    return "\n".join(["```{eval-rst}", *lines, "```"])
+
+
 GENERATED = {"command_line": command_line, "exit_codes": exit_codes, "configuration": configuration}
 
 
 def fill(app: Sphinx, docname: str, source: list[str]) -> None:
     """Put the generated text where a page asks for it, and let links to the repository's root lead to its pages."""
-    text = MARK.sub(lambda mark: project_file(mark[1]) if mark[1] in PROJECT else GENERATED[mark[1]](), source[0])
+    whole = next((name for name in MARK.findall(source[0]) if name in PROJECT), None)
+    text = project_file(whole) if whole else MARK.sub(lambda mark: GENERATED[mark[1]](), source[0])
+    text = PUBLIC.sub(documented, text)
     text = re.sub(r"\]\((?:\.\./)+([A-Z]+\.md)", lambda link: f"]({PROJECT[link[1]]}", text)
     source[0] = LAB.sub(r"\1 (`lab/\2`)", text)
 
