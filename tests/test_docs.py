@@ -173,3 +173,7 @@ def test_the_pages_build_without_a_warning(tmp_path: Path):
         "project/architecture": "crates",
     }.items():
         assert words in (tmp_path / f"{page}.html").read_text(encoding="utf-8"), page
+    listed = re.findall(r"^- `(voodoo\.[\w.]+)`", (DOCS / "reference/python-api.md").read_text(encoding="utf-8"), re.M)
+    built = (tmp_path / "reference/python-api.html").read_text(encoding="utf-8")
+    assert len(listed) > 100
+    assert [public for public in listed if not re.search(rf'id="(module-)?{re.escape(public)}"', built)] == []

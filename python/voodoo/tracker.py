@@ -89,7 +89,7 @@ class Tracker:
         return self._core.refusal
 
     def reset(self, *, joints: Mapping[str, Sequence[float]], fit_sizes: bool = True) -> Estimate:
-        """Set the pose, and the sizes, from positions of named joints and sites; stamps may restart afterwards.
+        """Set the pose, and the sizes, from positions of named sites; stamps may restart afterwards.
 
         Args:
             joints: site name -> (x, y, z) [m] in the world frame. Any subset that determines the pose: at least three

@@ -77,7 +77,7 @@ def track_command(
     cameras, keypoints with depth, depth images, or the legs in a laser, whichever the recording has. Until a person is found,
     and when the person has left, the status is searching and the coordinates are empty.
 
-    The .csv has stamp_s, person (1), status, residual_m, then NAME_x, NAME_y, NAME_z in meters for every joint and site, in
+    The .csv has stamp_s, person (1), status, residual_m, then NAME_x, NAME_y, NAME_z in meters for every site, in
     the recording's root frame (base_link if it has one), NAME_rad for every joint angle, and LIMB_status, the status of every
     limb. The .npz adds the pose of every limb. Ctrl-C writes the frames so far and ends with exit code 130; after a
     crash, voodoo recover does.
