@@ -192,6 +192,36 @@ def test_keypoints_of_the_recordings_own_camera(run, tmp_path):
     assert given >= 8 and matched >= 0.8 * given and residual < 0.05
 
 
+def test_keypoint_files_of_which_none_is_usable_are_refused(run, tmp_path):
+    folder = tmp_path / "kept"
+    keypoint_files(folder, open_recording(sample_path()))
+    asked = ("--keypoints", f"{COLOR}={folder}", "--out", "p.csv")
+    done = run(*asked, "--layout", "coco17")
+    assert done.exit_code == 1 and "expected 17 keypoints for coco17, found 25" in done.stderr
+    for file in folder.iterdir():
+        file.write_text("")
+    done = run(*asked)
+    assert done.exit_code == 1 and f"{folder}: expected keypoint files with people" in done.stderr
+    for file in folder.iterdir():
+        file.write_text('{"people": []}')
+    done = run(*asked)
+    assert done.exit_code == 0 and f"{folder}: nobody is in these keypoint files" in done.stderr
+    for file in folder.iterdir():
+        file.unlink()
+    done = run(*asked)
+    assert done.exit_code == 1 and "found 0" in done.stderr
+
+
+def test_keypoints_of_one_camera_need_depth_or_a_pose_and_their_layout_is_said(run, tmp_path):
+    keypoint_files(tmp_path / "all", open_recording(sample_path()))
+    asked = ("--keypoints", f"{COLOR}={tmp_path / 'all'}")
+    for words in (("--init", "auto"), ("--people", "any")):
+        done = run(*asked, "--use", "keypoints", *words, "--out", "p.csv")
+        assert done.exit_code == 1 and "need depth beside them, or a second camera" in " ".join(done.stderr.split())
+    done = run(*asked, "--use", "keypoints,depth", "--init", "auto", "--out", "p.csv")
+    assert done.exit_code == 0 and "25 keypoints, taken for body25b; --layout says another" in done.stderr
+
+
 @pytest.mark.parametrize(("times", "words"), [(0.5, "160x120 pixels (0.5 times"), (3.0, "960x720 pixels (3 times")])
 def test_keypoints_beside_the_person_in_depth_are_refused(tmp_path, times, words):
     recording = open_recording(sample_path())

@@ -145,7 +145,7 @@ def taken_layout(people: Sequence[FloatArray], asked: str | None) -> tuple[str, 
     if asked is None:
         fit = " and ".join(name for name, layout in LAYOUTS.items() if layout.count == len(people[0]))
         notes = f"{len(people[0])} keypoints fit {fit}, and the persons do not tell: taken for {shape}; --layout says another"
-        return shape, () if certain else (notes,)
+        return shape, (f"{len(people[0])} keypoints, taken for {shape}; --layout says another" if certain else notes,)
     notes = f"the layout is {asked}, as asked for, but the persons have the shape of {shape}"
     return asked, (notes,) if certain and shape != asked else ()
 
