@@ -23,8 +23,8 @@ from voodoo.measurements import (
 )
 from voodoo.model.camera import Camera
 from voodoo.pipeline.frozen import unchanged
-from voodoo.pipeline.pairing import WAIT_S
 from voodoo.recordings.recording import refuse_blank
+from voodoo.recordings.together import WAIT_S
 
 GAP_S = 1.0
 """After this time without a measurement, persons have moved and the search starts again."""
