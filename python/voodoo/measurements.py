@@ -61,11 +61,12 @@ class DepthImage:
 
 def implausible_depth(image: DepthArray, meters_per_unit: float) -> float | None:
     """Median of some depths of an image [m] if no camera measures it, so that the unit is wrong; None: it may be right."""
-    observed = image[::_STRIDE, ::_STRIDE].astype(np.float64)
-    returned = observed[np.isfinite(observed) & (observed > 0.0)]
+    observed = image[::_STRIDE, ::_STRIDE]
+    returned = observed[np.isfinite(observed) & (observed > 0)]
     if not returned.size:
         return None
-    median = float(np.median(returned)) * meters_per_unit
+    half = len(returned) // 2
+    median = float(np.partition(returned, half)[half]) * meters_per_unit  # np.median takes twice as long
     low, high = MEASURED_M
     return None if low <= median <= high else median
 
