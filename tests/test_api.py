@@ -4,6 +4,7 @@ import subprocess
 import sys
 import threading
 import time
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import pytest
 import voodoo
 from scene import rest_pose, standing_joints, surface
 from voodoo import BodyError, ConfigError, MeasurementError, VoodooError
+from voodoo.errors import UnitWarning
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +38,39 @@ def frame_of(points, stamp=0.0, **options):
     frame = voodoo.Frame(stamp=stamp)
     frame.add_points(points, **options)
     return frame
+
+
+METERS = np.full((48, 64), 2.5, dtype=np.float32)
+MILLIMETERS = np.full((48, 64), 2500, dtype=np.uint16)
+
+
+def warned_of(*images):
+    """What `add_depth` warns of in two frames with each of some (source, image, options)."""
+    camera = voodoo.Camera(64, 48, 50.0, 50.0, 32.0, 24.0)
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("default")
+        for stamp in (0.0, 0.1):
+            frame = voodoo.Frame(stamp=stamp)
+            for source, image, options in images:
+                frame.add_depth(image, camera=camera, source=source, **options)
+    return [(each.category, str(each.message).split(":")[0], each.filename) for each in found]
+
+
+def test_depth_of_a_wrong_unit_warns_once_for_each_sensor():
+    wrong = [
+        ("floats", MILLIMETERS.astype(np.float32), {"meters_per_unit": 1.0}),
+        ("integers", MILLIMETERS, {"meters_per_unit": 1.0}),
+        ("without a unit", METERS, {}),
+    ]
+    assert warned_of(*wrong) == [(UnitWarning, source, __file__) for source, _, _ in wrong]
+    near, far = METERS / 50.0, METERS * 30.0
+    right = [
+        ("a", METERS, {"meters_per_unit": 1.0}),
+        ("b", MILLIMETERS, {}),
+        ("c", METERS * 0.0, {"meters_per_unit": 1.0}),
+    ]
+    beside = [("near", near, {"meters_per_unit": 1.0}), ("far", far, {"meters_per_unit": 1.0})]
+    assert warned_of(*right, *beside) == []
 
 
 def test_an_estimate_has_every_name_and_shape(tracker, body, cloud):

@@ -18,7 +18,7 @@ from voodoo.recordings import open_recording
 from voodoo.recordings.empty_scene import pictures_of
 from voodoo.recordings.joined import Joined, WithKeypoints
 from voodoo.recordings.left_out import LeftOut
-from voodoo.recordings.together import together
+from voodoo.recordings.together import in_turn, together
 from voodoo.sensors.pinhole import Pinhole
 from voodoo.sensors.settings import FrontEndSettings
 
@@ -65,6 +65,42 @@ def test_a_picture_belongs_to_the_frame_it_is_nearest_to():
         for other in ("a", "b"):
             near = min(abs(item.stamp - frame.stamp) for item in items if item.sensor == other)
             assert (near < 0.05) == any(item.sensor == other for item in frame.measurements)
+
+
+class InTurn:
+    complete = False
+
+    def __init__(self, *items):
+        self.items = items
+
+    def __iter__(self):
+        return in_turn(iter(sorted(self.items, key=lambda item: item.stamp)), "depth")
+
+
+def test_the_last_picture_belongs_to_the_last_frame_if_it_follows_soon():
+    depths = [image("depth", 0.1 * k) for k in range(3)]
+    colors = [image("color", 0.1 * k + 0.006) for k in range(3)]
+    fast = [image("fast", 0.008 * k) for k in range(27)]
+    frames = list(paired(InTurn(*depths, *colors, *fast, image("late", 0.215), image("color", 0.22))))
+    assert [frame.stamp for frame in frames] == [0.0, 0.1, 0.2]
+    for frame, color in zip(frames, colors, strict=True):
+        assert [item for item in frame.measurements if item.sensor == "color"] == [color]
+    assert frames[-1].measurements[-1] is depths[-1]
+    assert {item.sensor for item in frames[-1].measurements} == {"depth", "color", "fast"}
+    assert all(item.stamp < 0.2 for item in frames[-1].measurements if item.sensor == "fast")
+    (alone,) = paired(InTurn(depths[0], colors[0]))
+    assert set(alone.measurements) == {depths[0], colors[0]}
+
+
+def test_frames_before_damage_are_read():
+    def damaged():
+        yield image("depth", 0.0)
+        raise RecordingError("cut off")
+
+    frames = in_turn(damaged(), "depth")
+    assert next(frames).stamp == 0.0
+    with pytest.raises(RecordingError, match="cut off"):
+        next(frames)
 
 
 def test_one_picture_and_rare_ones():

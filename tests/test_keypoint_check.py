@@ -11,9 +11,10 @@ import pytest
 from commands import refused, run
 from test_starts import AROUND, CAMERA, images, person
 from voodoo.errors import RecordingError
+from voodoo.measurements import DepthImage, KeypointImage
 from voodoo.recordings import open_recording
-from voodoo.recordings.keypoint_check import check_keypoints
-from voodoo.recordings.keypoint_layouts import LAYOUTS, layout_by_shape
+from voodoo.recordings.keypoint_check import check_keypoints, check_on_depth
+from voodoo.recordings.keypoint_layouts import LAYOUTS, LIMBS, layout_by_shape
 from voodoo.recordings.left_out import LeftOut
 
 WIDTH, HEIGHT = CAMERA.width, CAMERA.height
@@ -96,6 +97,52 @@ def test_what_nothing_explains_is_refused_too():
         check_keypoints("x", of_pixels(lambda u, v: generator.uniform(0.0, 400.0, (2, len(u)))))
     with pytest.raises(RecordingError, match="inside of their pictures, found 100%"):
         check_keypoints("x", [instant[:1] for instant in of_pixels(lambda u, v: (u + WIDTH, v))])
+
+
+@pytest.mark.parametrize(
+    ("times", "words"), [(2.0, r"1280x960 pixels \(2 times"), (3.0, r"1920x1440 pixels \(3 times")]
+)
+def test_keypoints_outside_of_their_pictures_tell_how_large_these_are(times, words):
+    alone = [instant[:1] for instant in of_pixels(lambda u, v: (u * times, v * times))]
+    with pytest.raises(RecordingError, match=rf"found \d+% outside; .*room in pictures of {words}"):
+        check_keypoints("x", alone)
+
+
+def test_keypoints_outside_of_their_pictures_are_not_of_smaller_ones():
+    """The rays of level cameras side by side meet with any size."""
+    beside = [np.eye(4), np.eye(4)]
+    for pose, y in zip(beside, (0.0, -0.6), strict=True):
+        pose[:3] = np.column_stack([(0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.0, y, 1.0)])
+    sound = [images([person((2.3, 0.1 * index))], beside, noise=4.0) for index in range(6)]
+    larger = [
+        [
+            replace(image, people=tuple(changed(rows, lambda u, v: (2 * u, 2 * v)) for rows in image.people))
+            for image in one
+        ]
+        for one in sound
+    ]
+    with pytest.raises(RecordingError, match=r"outside.*(1\.5|2) times"):
+        check_keypoints("x", larger)
+
+
+def drawn(image, rows, away, *, without=()):
+    """Draw the limbs of keypoints (K, 3) at a depth [m]."""
+    at = {part.site: next(iter(part.weights)) for part in LAYOUTS["body25b"].parts}
+    for above, below in (pair for pair in LIMBS if pair not in without):
+        ends = [tuple(int(value) for value in rows[at[end], :2].round()) for end in (above, below)]
+        cv2.line(image, *ends, away, 9)
+
+
+def test_of_two_sizes_by_which_keypoints_lie_on_something_the_persons_size_tells():
+    rows = images([person((2.5, 0.0))], AROUND[:1])[0].people[0]
+    smaller, furniture = (changed(rows, lambda u, v, by=by: (u * by, v * by)) for by in (0.5, 1.0 / 3.0))
+    image = np.full((HEIGHT, WIDTH), 6.0, dtype=np.float32)
+    drawn(image, rows, 2.5, without=LIMBS[:1])
+    drawn(image, furniture, 2.0)  # where the keypoints would be if they were of larger pictures
+    seen = KeypointImage("color", 0.0, (smaller,), "body25b", CAMERA, np.eye(4))
+    depth = DepthImage("depth", 0.0, image, 1.0, CAMERA, np.eye(4))
+    with pytest.raises(RecordingError, match=r"320x240 pixels \(0\.5 times"):
+        check_on_depth("x", [(seen, depth)] * 8)
 
 
 def test_one_camera_that_disagrees_is_said():

@@ -148,9 +148,9 @@ def all_nan(bus):
     bus.bad(image=np.full(bus.images[0].image.shape, np.nan, dtype=np.float32))
 
 
-def millimeters(bus):
-    for dtype in (np.float32, np.uint16, np.float32):
-        bus.bad(1, image=bus.images[bus.at].image.astype(dtype), meters_per_unit=1.0)
+def wrong_units(bus):
+    for dtype, unit in ((np.float32, 1.0), (np.uint16, 1.0), (np.uint16, 1e-6)):
+        bus.bad(1, image=bus.images[bus.at].image.astype(dtype), meters_per_unit=unit)
 
 
 def another_size(bus):
@@ -250,7 +250,7 @@ FAULTY = {
     "frozen picture": frozen,
     "blank picture": blank,
     "blank picture (NaN)": all_nan,
-    "wrong unit": millimeters,
+    "wrong unit": wrong_units,
     "another size": another_size,
     "calibration missing": no_calibration,
     "calibration unusable": bad_calibration,

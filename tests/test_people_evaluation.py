@@ -3,6 +3,7 @@
 import csv
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,10 +13,12 @@ from voodoo.cli import app
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.evaluation import metrics
 from voodoo.evaluation.people import PeopleScore, score, together
-from voodoo.evaluation.people_evaluate import people_markdown, read_rows
+from voodoo.evaluation.people_evaluate import people_markdown, read_rows, truth_of
 from voodoo.export.table import save_result
+from voodoo.recordings import sample_path
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.people_truth import PeopleTruth
+from voodoo.recordings.recording import Reference
 from voodoo.recordings.truth import read_people_truth
 
 pytest.importorskip("motmetrics")
@@ -259,6 +262,36 @@ def test_any_result_can_be_judged_by_the_command_line(voodoo_data, tmp_path):
 
     no_truth = CliRunner().invoke(app, ["eval", str(voodoo_data / "rendered"), "--only", "rd_r1*", *command[2:]])
     assert no_truth.exit_code != 0
+
+
+def test_a_result_of_the_only_person_is_judged_beside_their_truth(tmp_path):
+    known = open_recording(sample_path()).reference
+    places = known.positions + [0.0, 0.02, 0.0]
+    rows = rows_of(known.stamps, np.full(len(known.stamps), 4), places, names=known.names)
+    save_result(tmp_path / "theirs.csv", lambda: iter([rows]))
+    command = ["eval", str(sample_path()), "--result", str(tmp_path / "theirs.csv")]
+    message = CliRunner().invoke(app, command)
+    assert message.exit_code == 0, message.output
+    assert "| bend_scoop | 1 | 1 | 1.000 | 1.000 | 0 | - | 0.00 (0.00) | 0 of 1 | 0.0 | 0 | 2.0 | - |" in message.output
+
+
+@pytest.mark.parametrize(
+    ("reference", "words"),
+    [
+        (None, "found none"),
+        (
+            Reference(np.zeros(1), ("humanoid_root",), np.zeros((1, 1, 3)), exact=False),
+            "that another tracker estimated",
+        ),
+        (Reference(np.zeros(1), ("l_hip",), np.zeros((1, 1, 3)), exact=True), "found l_hip"),
+    ],
+)
+def test_a_truth_that_cannot_judge_is_named(reference, words):
+    recording = SimpleNamespace(path="walk", people=None, reference=reference)
+    with pytest.raises(
+        RecordingError, match=rf"walk: expected truth_people.csv or truth.csv with humanoid_root.*{words}"
+    ):
+        truth_of(recording)
 
 
 def test_without_the_library_the_extra_is_named(monkeypatch):

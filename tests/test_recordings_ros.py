@@ -6,6 +6,7 @@ import zipfile
 
 import numpy as np
 import pytest
+from ruamel.yaml import YAML
 
 from bag_writer import Messages, write_bag
 from ros_bags import DEPTH, IDENTITY, INFO, TF, bag, depth_entry, only
@@ -26,6 +27,22 @@ def test_both_storages_open_as_directory_and_as_file(tmp_path, storage, bare):
     np.testing.assert_array_equal(first.image, DEPTH)
     np.testing.assert_allclose(first.root_from_sensor[:3, 3], (1, 2, 3))
     assert (first.stamp, second.stamp, first.meters_per_unit) == (10.0, 10.5, 0.001)
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_the_metadata_of_a_folder_are_parsed_once(tmp_path, monkeypatch, storage):
+    parsed = []
+    load = YAML.load
+
+    def counted(self, text, *rest):
+        parsed.append("rosbag2_bagfile_information" in str(text))
+        return load(self, text, *rest)
+
+    monkeypatch.setattr(YAML, "load", counted)
+    recording = open_recording(bag(tmp_path, TF, INFO, depth_entry(), depth_entry(10.5), storage=storage))
+    assert recording.info().frames == 2
+    assert [[item.stamp for item in only(recording)] for _ in range(2)] == [[10.0, 10.5]] * 2
+    assert sum(parsed) == 1
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])

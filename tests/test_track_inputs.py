@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -191,17 +192,48 @@ def test_keypoints_of_the_recordings_own_camera(run, tmp_path):
     assert given >= 8 and matched >= 0.8 * given and residual < 0.05
 
 
-def test_keypoints_beside_the_person_in_depth_are_refused(tmp_path):
+def test_keypoint_files_of_which_none_is_usable_are_refused(run, tmp_path):
+    folder = tmp_path / "kept"
+    keypoint_files(folder, open_recording(sample_path()))
+    asked = ("--keypoints", f"{COLOR}={folder}", "--out", "p.csv")
+    done = run(*asked, "--layout", "coco17")
+    assert done.exit_code == 1 and "expected 17 keypoints for coco17, found 25" in done.stderr
+    for file in folder.iterdir():
+        file.write_text("")
+    done = run(*asked)
+    assert done.exit_code == 1 and f"{folder}: expected keypoint files with people" in done.stderr
+    for file in folder.iterdir():
+        file.write_text('{"people": []}')
+    done = run(*asked)
+    assert done.exit_code == 0 and f"{folder}: nobody is in these keypoint files" in done.stderr
+    for file in folder.iterdir():
+        file.unlink()
+    done = run(*asked)
+    assert done.exit_code == 1 and "found 0" in done.stderr
+
+
+def test_keypoints_of_one_camera_need_depth_or_a_pose_and_their_layout_is_said(run, tmp_path):
+    keypoint_files(tmp_path / "all", open_recording(sample_path()))
+    asked = ("--keypoints", f"{COLOR}={tmp_path / 'all'}")
+    for words in (("--init", "auto"), ("--people", "any")):
+        done = run(*asked, "--use", "keypoints", *words, "--out", "p.csv")
+        assert done.exit_code == 1 and "need depth beside them, or a second camera" in " ".join(done.stderr.split())
+    done = run(*asked, "--use", "keypoints,depth", "--init", "auto", "--out", "p.csv")
+    assert done.exit_code == 0 and "25 keypoints, taken for body25b; --layout says another" in done.stderr
+
+
+@pytest.mark.parametrize(("times", "words"), [(0.5, "160x120 pixels (0.5 times"), (3.0, "960x720 pixels (3 times")])
+def test_keypoints_beside_the_person_in_depth_are_refused(tmp_path, times, words):
     recording = open_recording(sample_path())
-    keypoint_files(tmp_path / "half", recording)
-    for file in (tmp_path / "half").iterdir():
+    keypoint_files(tmp_path / "other", recording)
+    for file in (tmp_path / "other").iterdir():
         content = json.loads(file.read_text())
         rows = np.array(content["people"][0]["pose_keypoints_2d"]).reshape(-1, 3)
-        rows[:, :2] /= 2.0
+        rows[:, :2] *= times
         content["people"][0]["pose_keypoints_2d"] = rows.ravel().tolist()
         file.write_text(json.dumps(content))
-    with pytest.raises(RecordingError, match=r"on a person.*160x120 pixels \(0\.5 times"):
-        join(recording, keypoints={COLOR: tmp_path / "half"})
+    with pytest.raises(RecordingError, match=rf"on a person.*{re.escape(words)}"):
+        join(recording, keypoints={COLOR: tmp_path / "other"})
 
 
 def test_several_depth_cameras_count_by_their_names():

@@ -56,6 +56,10 @@ class DetectorWarning(UserWarning):
     """A detector failed, and the tracker's step continued without it. The warning names the exception."""
 
 
+class UnitWarning(UserWarning):
+    """The depths of a depth image are none that a camera measures. The warning names the source and the unit."""
+
+
 def one_thread(kind: type[T]) -> type[T]:
     """A class whose methods raise a VoodooError when another thread is in one of them; without it, it is PyO3's RuntimeError."""
     for name, value in list(vars(kind).items()):

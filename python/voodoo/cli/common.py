@@ -16,7 +16,7 @@ import typer
 
 from voodoo.cli.signals import INTERRUPTED
 from voodoo.cli.terminal import READER_LEFT, Escaped
-from voodoo.errors import NoPoseError, VoodooError, reason
+from voodoo.errors import NoPoseError, UnitWarning, VoodooError, reason
 
 T = TypeVar("T")
 WIDTH = 200
@@ -118,12 +118,14 @@ def print_interrupted(interrupted: bool, done: str) -> None:
 def clear_errors() -> Iterator[None]:
     """Convert expected errors to one line on stderr and the exit code FAILED or NO_POSE.
 
-    NumPy's warnings (e.g. on overflow in a damaged file) are suppressed; -W shows them.
+    NumPy's warnings (e.g. on overflow in a damaged file), and those of units, which commands doubt in their own words, are
+    suppressed; -W shows them.
     """
     try:
         with warnings.catch_warnings():
             if not sys.warnoptions:
                 warnings.simplefilter("ignore", RuntimeWarning)
+                warnings.simplefilter("ignore", UnitWarning)
             yield
     except (VoodooError, OSError, MemoryError) as error:
         little = isinstance(error, MemoryError)

@@ -35,7 +35,8 @@ def eval_command(
     result: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE.csv", help="Evaluate this result of several persons in one RECORDING, instead of tracking."
+            metavar="FILE.csv",
+            help="Evaluate this result, of one person or several, in one RECORDING, instead of tracking.",
         ),
     ] = None,
     reading: options.Reading,
@@ -49,7 +50,7 @@ def eval_command(
 
     A recording with truth_people.csv beside it is tracked with --people any and evaluated for MOTA, IDF1, identity switches,
     false bodies and joints. With --result a .csv of any program is evaluated: stamp_s, person, status, residual_m, then
-    NAME_x, NAME_y, NAME_z. people.csv and people.md are written to --out.
+    NAME_x, NAME_y, NAME_z, also beside a truth.csv of one person. people.csv and people.md are written to --out.
 
     Several persons, and the plots of --out, need pip install 'voodoo-tracker[eval]'.
 

@@ -10,19 +10,19 @@ from typing import Any
 import numpy as np
 
 from voodoo.errors import RecordingError, VoodooError
-from voodoo.evaluation.people import RULES, PeopleScore, motmetrics, score, together
+from voodoo.evaluation.people import ROOT, RULES, PeopleScore, motmetrics, score, together
 from voodoo.evaluation.score import RATIO, written
 from voodoo.evaluation.summary import table_head, table_row, table_text
 from voodoo.export.people import PeopleTrack
 from voodoo.export.table import Arrays, opened_result
 from voodoo.names import Automatic
-from voodoo.people import People
+from voodoo.people import ONE, People
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import start_people
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.people_truth import PeopleTruth
 from voodoo.recordings.recording import Recording
-from voodoo.recordings.truth import PEOPLE_TRUTH_FILE, find_beside
+from voodoo.recordings.truth import PEOPLE_TRUTH_FILE, TRUTH_FILE, find_beside
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.whole import write_whole
 
@@ -36,7 +36,7 @@ def evaluate_result(path: Path, result: Path, *, options: Mapping[str, Any] | No
     """Evaluate a result file, see voodoo.export.table.opened_result.
 
     Args:
-        path: of the recording, with truth_people.csv beside it.
+        path: of the recording, with truth_people.csv or truth.csv beside it.
         result: .csv or .npz in the recording's root frame.
         options: see open_recording.
 
@@ -114,14 +114,21 @@ def evaluate_people(
 
 
 def truth_of(recording: Recording) -> PeopleTruth:
-    """The ground truth of several persons.
+    """The ground truth of several persons, or of the only one, who is in view wherever the root is known.
 
     Raises:
-        RecordingError: it has none.
+        RecordingError: it has none, or none with the root.
     """
-    if recording.people is None:
-        raise RecordingError(f"{recording.path}: expected {PEOPLE_TRUTH_FILE} beside the recording, found none")
-    return recording.people
+    one = recording.reference
+    if recording.people is not None:
+        return recording.people
+    expected = f"{recording.path}: expected {PEOPLE_TRUTH_FILE} or {TRUTH_FILE} with {ROOT} beside the recording"
+    if one is None or not one.exact:
+        raise RecordingError(f"{expected}, found {'none' if one is None else 'joints that another tracker estimated'}")
+    if ROOT not in one.names:
+        raise RecordingError(f"{expected}, found {', '.join(one.names)}")
+    in_view = np.asarray(np.isfinite(one.positions[:, one.names.index(ROOT)]).all(axis=1), dtype=np.float64)
+    return PeopleTruth(one.stamps, np.array([ONE]), in_view[:, None], one.names, one.positions[:, None])
 
 
 DERIVED = ("mota", "idf1", "false_a_minute")
@@ -129,7 +136,7 @@ DERIVED = ("mota", "idf1", "false_a_minute")
 
 def people_markdown(scores: Sequence[PeopleScore]) -> str:
     """A table with a row per recording, and one for all together."""
-    lines = ["## Several people, against exact truth\n", *table_head(name for name, _ in _COLUMNS)]
+    lines = ["## People, against exact truth\n", *table_head(name for name, _ in _COLUMNS)]
     lines += [_line(score) for score in scores]
     if len([score for score in scores if not score.failure]) > 1:
         lines.append(_line(together(scores)))

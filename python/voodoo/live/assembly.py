@@ -13,17 +13,23 @@ import numpy.typing as npt
 
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.live.source import Arrival, Faults
-from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
+from voodoo.measurements import (
+    MEASURED_M,
+    ColorImage,
+    DepthImage,
+    Measurement,
+    RecordedFrame,
+    implausible_depth,
+)
 from voodoo.model.camera import Camera
 from voodoo.pipeline.frozen import unchanged
-from voodoo.pipeline.pairing import WAIT_S
 from voodoo.recordings.recording import refuse_blank
+from voodoo.recordings.together import WAIT_S
 
 GAP_S = 1.0
 """After this time without a measurement, persons have moved and the search starts again."""
 _PASSED = 0.25
 """If stamps advance by more than a gap while less than this fraction of it has elapsed, the clock was set ahead."""
-_STRIDE = 16
 
 
 @dataclass(frozen=True)
@@ -119,7 +125,6 @@ class HostTime:
 _STALE_S = 0.5
 """A measurement that is older than its frame by more does not belong to it."""
 _PENDING = 4
-_FAR_M = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,7 +269,7 @@ class Assembler:
                 self._breaks = True
         if isinstance(item, DepthImage):
             refuse_blank(item, item.sensor)
-            self._refuse_far(item)
+            self._refuse_unit(item)
             before_image = self._images.get(item.sensor)
             self._images[item.sensor] = item.image
             if before_image is not None and unchanged(before_image, item.image):
@@ -272,9 +277,9 @@ class Assembler:
                 raise RecordingError(f"{where}: the same as the image before", reason="frozen picture")
         return item
 
-    def _refuse_far(self, item: DepthImage) -> None:
-        observed = item.image[::_STRIDE, ::_STRIDE]
-        meters = observed[np.isfinite(observed) & (observed > 0.0)] * item.meters_per_unit
-        if meters.size and float(np.median(meters)) > _FAR_M:
-            where, found = f"{item.sensor}, stamp {item.stamp:.6f}", f"a median of {np.median(meters):.0f}"
-            raise RecordingError(f"{where}: expected depths below {_FAR_M:.0f} m, found {found} m", reason="wrong unit")
+    def _refuse_unit(self, item: DepthImage) -> None:
+        found = implausible_depth(item.image, item.meters_per_unit)
+        if found is not None:
+            where, (low, high) = f"{item.sensor}, stamp {item.stamp:.6f}", MEASURED_M
+            expected = f"expected depths between {low:g} and {high:g} m"
+            raise RecordingError(f"{where}: {expected}, found a median of {found:.3g} m", reason="wrong unit")

@@ -24,7 +24,7 @@ FAULTS: dict[str, str] = {
     "no stamp": "a header with a stamp of zero, or one that is no time",
     "frozen picture": "a depth image that repeats the one before bit by bit under another stamp",
     "blank picture": "a depth image in which nothing returned: all zero or NaN",
-    "wrong unit": "depths beyond 100 m: meters that are millimeters",
+    "wrong unit": "a median depth below 1 cm or beyond 100 m",
     "another size": "an image of another size than its calibration says",
     "calibration missing": "an image of a camera whose calibration did not come",
     "calibration unusable": "a calibration that makes no camera",

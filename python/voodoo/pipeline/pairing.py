@@ -6,9 +6,7 @@ from collections.abc import Iterator
 
 from voodoo.measurements import RecordedFrame
 from voodoo.recordings.recording import Recording
-
-WAIT_S = 0.010
-"""How long a frame waits for measurements that belong to it [s]."""
+from voodoo.recordings.together import WAIT_S
 
 
 def paired(recording: Recording) -> Iterator[RecordedFrame]:

@@ -297,8 +297,13 @@ def check_findable(recording: Recording, tracker: Tracker | People, use: Sequenc
         blind.add("depth")
     if several or not serves(body):
         blind.add("scan")
+    views = sum(sensor.kind == "keypoints" for sensor in recording.info().sensors)
+    single = views == 1 and "keypoints" in kinds and "depth" not in kinds
+    if single:
+        blind.add("keypoints")
     if kinds and kinds <= blind:
         alone = f"by {', '.join(sorted(map(str, kinds)))} alone the body {body.name!r} is not found"
+        alone += " (keypoints of one camera need depth beside them, or a second camera)" if single else ""
         if several:
             raise VoodooError(
                 f"{recording.name}: {alone}; several people are found in depth images, keypoints and markers"

@@ -5,9 +5,11 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Collection, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path, PurePath
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 from rosbags.interfaces import Connection
 from rosbags.rosbag1 import Reader
@@ -27,12 +29,13 @@ _MOST_SKIPPED = 100
 millions before each."""
 
 
-def bag_file(path: Path, unpacking: Unpacking) -> BagFile:
+def bag_file(path: Path, unpacking: Unpacking, *, index: FolderIndex | None = None) -> BagFile:
     """The reader of a bag.
 
     Args:
         path: .bag, .mcap, .db3, or a folder with metadata.yaml.
         unpacking: limits compressed data.
+        index: of this folder, if it was read before.
 
     Returns:
         A reader whose `messages` are in the order of their time, or as they were written if the clock was set back.
@@ -41,7 +44,7 @@ def bag_file(path: Path, unpacking: Unpacking) -> BagFile:
         RecordingError: another kind of file.
     """
     if path.is_dir():
-        return BagFolder(path, unpacking)
+        return BagFolder(path, unpacking, index)
     if path.suffix.lower() == ".mcap":
         return McapFile(path, unpacking)
     if path.suffix.lower() == ".db3":
@@ -114,16 +117,53 @@ class Ros1File(Reader):
         return data if compression == "none" else self._unpacking.unpack(data, compression)
 
 
+@dataclass(frozen=True)
+class FolderIndex:
+    """What metadata.yaml of a folder says: its topics, times, and the files with the format of each."""
+
+    connections: tuple[Connection, ...]
+    metadata: ReaderMetadata
+    parts: tuple[tuple[str, Path], ...]
+
+
 class BagFolder(DirectoryReader):
     """Reads a folder of MCAP or SQLite files in the order given by its metadata.yaml."""
 
-    def __init__(self, path: Path, unpacking: Unpacking) -> None:
-        """Read nothing yet."""
+    def __init__(self, path: Path, unpacking: Unpacking, index: FolderIndex | None = None) -> None:
+        """Read nothing yet; with an index, metadata.yaml is not read again: its YAML takes long."""
         super().__init__(path)
-        self._folder, self._unpacking = path, unpacking
+        self._folder, self._unpacking, self._index = path, unpacking, index
         self.STORAGE_PLUGINS: Any = {"mcap": partial(McapFile, unpacking=unpacking), "sqlite3": SqliteFile}
 
+    @property
+    def index(self) -> FolderIndex | None:
+        """For the next reader of this folder, while this one is open; None where files are unpacked for each reader."""
+        if self.metadata.compression_mode == "file":
+            return None
+        parts = tuple(
+            ("mcap" if isinstance(part, McapFile) else "sqlite3", Path(str(part.path))) for part in self._parts
+        )
+        return FolderIndex(tuple(self.connections), self.metadata, parts)
+
+    @property
+    def _parts(self) -> list[McapFile | SqliteFile]:
+        return cast(list[McapFile | SqliteFile], self.storages)
+
     def open(self) -> None:
+        """Read metadata.yaml, if there is no index yet, and the index of each file."""
+        if self._index is None:
+            self._read()
+            return
+        with ExitStack() as stack:
+            for name, path in self._index.parts:
+                part = self.STORAGE_PLUGINS[name](path)
+                part.open()
+                stack.callback(part.close)
+                self.storages.append(part)
+            self.connections, self.metadata = list(self._index.connections), self._index.metadata
+            self.stack = stack.pop_all()
+
+    def _read(self) -> None:
         """Check metadata.yaml and the size of the files, and read the index of each."""
         yaml = self._folder / "metadata.yaml"
         text = read_stored_text(yaml, "the metadata of a ROS 2 bag", most=MOST_METADATA)
@@ -138,7 +178,7 @@ class BagFolder(DirectoryReader):
         for item in self.connections:
             if not (isinstance(item.topic, str) and isinstance(item.msgtype, str) and isinstance(item.msgcount, int)):
                 raise RecordingError(f"{yaml}: expected the index of a ROS bag, found a topic {item[1:3]!r:.100}")
-        names = [PurePath(storage.path).name for storage in self.storages]  # type: ignore[attr-defined]
+        names = [PurePath(str(part.path)).name for part in self._parts]
         if len(set(names)) != len(names):
             raise RecordingError(f"{yaml}: expected every file once, found {', '.join(sorted(names))[:300]}")
 

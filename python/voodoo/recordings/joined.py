@@ -21,7 +21,7 @@ from voodoo.measurements import (
     RecordedFrame,
 )
 from voodoo.recordings.keypoint_check import check_keypoints, check_on_depth, some_of, taken_layout
-from voodoo.recordings.keypoint_files import read_people
+from voodoo.recordings.keypoint_files import read_people, refuse_unread
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.order import by_image
@@ -161,7 +161,8 @@ class WithKeypoints(Around):
         left_out: of the recording, see open_recording.
 
     Raises:
-        RecordingError: an unknown sensor, another number of files than images, or keypoints and calibration do not fit.
+        RecordingError: an unknown sensor, another number of files than images, no file that can be read, or keypoints and
+            calibration do not fit.
         MeasurementError: an unknown layout.
     """
 
@@ -190,16 +191,19 @@ class WithKeypoints(Around):
                     f"found {len(files)}"
                 )
             self._files[name] = images
-        unread = None if left_out is None else LeftOut()
-        people = [
-            rows
-            for files in self._files.values()
-            for found in some_of(files, partial(read_people, layout=layout, left_out=unread), good=bool)
-            for rows in found
-        ]
-        self._layout, notes = taken_layout(people, layout)
-        self._notes = (*notes, *self._checked())
+        people = {folder: self._some_people(self._files[name], folder, layout) for name, folder in folders.items()}
+        empty = (f"{folder}: nobody is in these keypoint files" for folder, found in people.items() if not found)
+        self._layout, notes = taken_layout([rows for found in people.values() for rows in found], layout)
+        self._notes = (*empty, *notes, *self._checked())
         self.assumed = (*self.assumed, *self._notes)
+
+    def _some_people(self, files: Sequence[Path | None], folder: Path, layout: str | None) -> list[FloatArray]:
+        """Some of the people in the files of a folder; damaged files are counted when they are read again."""
+        unread = None if self._left_out is None else LeftOut()
+        found = some_of(files, partial(read_people, layout=layout, left_out=unread), good=bool)
+        people = [rows for each in found for rows in each]
+        refuse_unread(folder, people, unread)
+        return people
 
     def _checked(self) -> tuple[str, ...]:
         """Check the keypoints of the first frames against calibration and depth."""

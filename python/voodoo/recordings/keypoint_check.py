@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations, islice, permutations
@@ -27,8 +27,9 @@ Change: TypeAlias = Callable[[FloatArray, tuple[int, int]], FloatArray]
 WRONG_M, RIGHT_M = 0.10, 0.05
 """Median distance between the rays of two cameras to one keypoint: above the first the calibration does not fit, below the second
 an explanation is accepted. It is 2 to 3 cm in sound recordings, and 15 cm and more with every mistake below."""
-_SPREADS_M = (0.1, 1.5)
-"""Median distance of a person's keypoints from their center, which is 0.4 m of a standing adult: other units are outside."""
+_ADULT_M, _SPREADS_M = 0.4, (0.1, 1.5)
+"""Median distance of a person's keypoints from their center: that of a standing adult, and a range that other units are outside
+of."""
 _CONFIDENT = 0.3
 _FEWEST = 20
 """Distances, or limbs, that a judgment needs."""
@@ -48,7 +49,8 @@ _CELL = 8
 _FARTHEST_PX = 1e6
 """Pixels beyond, which damaged files have, are in no picture."""
 _UNITS = {1000.0: "millimeters", 100.0: "centimeters", 1.0 / 0.3048: "feet", 1.0 / 0.0254: "inches"}
-_USUAL = (2.0, 1.5, 3.0, 4.0, 0.5, 2.0 / 3.0)
+_TIMES = (2.0, 1.5, 3.0, 4.0)
+_USUAL = (*_TIMES, *(1.0 / times for times in _TIMES))
 _SIZES = (*_USUAL, *(float(factor) for factor in np.geomspace(0.2, 5.0, 66)))
 """Factors from the pixels of the keypoints to those of the calibration that are tried: usual ones, then in steps of 5 %."""
 _ALIKE_M = 0.01
@@ -113,11 +115,11 @@ def check_keypoints(where: object, instants: Sequence[Instant]) -> tuple[str, ..
             reason = _unit(found) or "do keypoints and calibration belong to the same pictures?"
         raise RecordingError(f"{where}: {met} in the median{beside}; {reason}")
     if np.isfinite(found.distance) and not _human(found):
-        size = f"persons whose keypoints are {_long(found.spread)} from their center, 0.4 m for an adult"
+        size = f"persons whose keypoints are {_long(found.spread)} from their center, {_ADULT_M} m for an adult"
         reason = _unit(found) or "is it in another unit?"
         raise RecordingError(f"{where}: expected a calibration in meters, found {size}; {reason}")
     if outside > _MOST_OUTSIDE:
-        reason = "do keypoints and calibration belong to pictures of the same size?"
+        reason = f"do keypoints and calibration belong to pictures of the same size?{_room(instants)}"
         raise RecordingError(
             f"{where}: expected keypoints inside of their pictures, found {outside:.0%} outside; {reason}"
         )
@@ -143,7 +145,7 @@ def taken_layout(people: Sequence[FloatArray], asked: str | None) -> tuple[str, 
     if asked is None:
         fit = " and ".join(name for name, layout in LAYOUTS.items() if layout.count == len(people[0]))
         notes = f"{len(people[0])} keypoints fit {fit}, and the persons do not tell: taken for {shape}; --layout says another"
-        return shape, () if certain else (notes,)
+        return shape, (f"{len(people[0])} keypoints, taken for {shape}; --layout says another" if certain else notes,)
     notes = f"the layout is {asked}, as asked for, but the persons have the shape of {shape}"
     return asked, (notes,) if certain and shape != asked else ()
 
@@ -184,7 +186,8 @@ def _rays(image: KeypointImage, rows: FloatArray, change: Change) -> tuple[Float
 
 def _reading(instants: Sequence[Instant], *, sizes: Sequence[float]) -> tuple[Agreement, str] | None:
     """Another reading of the keypoints with which the rays meet best, in words; None: with none they do."""
-    tried = [(agreement(instants, change), words) for words, change in readings(instants[0][0].camera, sizes)]
+    possible = _possible(instants, readings(instants[0][0].camera, sizes))
+    tried = [(agreement(instants, change), words) for words, change in possible]
     tried += [(agreement(_reordered(instants, it)), _order_words(instants[0], it)) for it in _orders(instants[0])]
     tried = [(each, words) for each, words in tried if _human(each) and each.distance < RIGHT_M]
     least = min((each.distance for each, _ in tried), default=np.inf)
@@ -196,11 +199,25 @@ def readings(camera: Camera, sizes: Sequence[float] = _USUAL) -> Iterator[tuple[
     for words, change in _TURNS.items():
         yield f"they are {words}", change
     for factor in sizes:
-        size = f"{round(camera.width / factor)}x{round(camera.height / factor)} pixels"
-        yield (
-            f"they are of pictures of about {size} ({1.0 / factor:.2g} times the calibrated size)",
-            partial(_resized, by=factor),
-        )
+        yield f"they are of pictures of about {_size_words(camera, factor)}", partial(_resized, by=factor)
+
+
+def _size_words(camera: Camera, factor: float) -> str:
+    size = f"{round(camera.width / factor)}x{round(camera.height / factor)} pixels"
+    return f"{size} ({1.0 / factor:.2g} times the calibrated size)"
+
+
+def _possible(instants: Sequence[Instant], tried: Iterable[tuple[str, Change]]) -> Iterator[tuple[str, Change]]:
+    """The readings by which keypoints are inside of their pictures: those outside are of larger ones, not of smaller ones."""
+    return ((words, change) for words, change in tried if _outside(instants, change) <= _MOST_OUTSIDE)
+
+
+def _room(instants: Sequence[Instant]) -> str:
+    """The smallest of the usual pictures in which keypoints have room, in words; "" if they have in none."""
+    camera = instants[0][0].camera
+    larger = ((_size_words(camera, factor), partial(_resized, by=factor)) for factor in sorted(_USUAL, reverse=True))
+    words = next((words for words, _ in _possible(instants, larger)), "")
+    return words and f" They have room in pictures of {words}"
 
 
 def _resized(at: FloatArray, _: tuple[int, int], *, by: float) -> FloatArray:
@@ -251,13 +268,13 @@ def _order_words(cameras: Instant, order: tuple[int, ...]) -> str:
     return f"they are of other cameras, {', '.join(pairs)}"
 
 
-def _outside(instants: Sequence[Instant]) -> float:
-    """Share of the confident keypoints that lie outside of their pictures."""
+def _outside(instants: Sequence[Instant], change: Change = lambda at, _: at) -> float:
+    """Share of the confident keypoints that lie outside of their pictures, after a change of the pixels."""
     out = []
     for image in (image for instant in instants for image in instant):
+        size = (image.camera.width, image.camera.height)
         for rows in image.people:
-            size = np.array([image.camera.width, image.camera.height])
-            at = rows[rows[:, 2] >= _CONFIDENT, :2] / size
+            at = change(rows[rows[:, 2] >= _CONFIDENT, :2], size) / np.array(size)
             out.append(((at < -_OUTSIDE) | (at > 1.0 + _OUTSIDE)).any(axis=1))
     gathered = np.concatenate(out) if out else np.empty(0)
     return float(gathered.mean()) if len(gathered) else 0.0
@@ -281,20 +298,33 @@ def check_on_depth(where: object, pairs: Sequence[tuple[KeypointImage, DepthImag
     pairs = [pair for pair in pairs if pair[0].people]
     views = [(image, _nearest(image, depth)) for image, depth in pairs[:: max(len(pairs) // _INSTANTS, 1)][:_INSTANTS]]
     found = _standing_out(views, lambda at, _: at)
-    if found is None or found >= _OFF:
+    if found is None or found.share >= _OFF:
         return
-    tried = [(_standing_out(views, change) or 0.0, words) for words, change in readings(views[0][0].camera)]
-    share, words = max(tried, key=lambda each: each[0])
-    if share >= _ON:
+    possible = _possible([[image] for image, _ in views], readings(views[0][0].camera))
+    tried = [(other, words) for words, change in possible if (other := _standing_out(views, change)) is not None]
+    # Furniture stands out as well: of the readings that fit, the size of the person tells.
+    fitting = [(other.share - other.misfit, other, words) for other, words in tried if other.share >= _ON]
+    if fitting:
+        _, other, words = max(fitting, key=lambda each: each[0])
         raise RecordingError(
-            f"{where}: expected keypoints on a person in the depth images, found {found:.0%} of the limbs before what is behind "
-            f"them; {words}: then {share:.0%} are"
+            f"{where}: expected keypoints on a person in the depth images, found {found.share:.0%} of the limbs before what is "
+            f"behind them; {words}: then {other.share:.0%} are"
         )
 
 
-def _standing_out(views: Sequence[tuple[KeypointImage, FloatArray]], change: Change) -> float | None:
-    """Share of the limbs whose middle is nearer than the surface on one of their sides; None: too few limbs."""
+@dataclass(frozen=True)
+class _Standing:
+    """How keypoints lie on depth: share of the limbs whose middle is nearer than the surface on one of their sides, and size of
+    the persons at that depth, as the logarithm of how many times an adult's it is, without its sign."""
+
+    share: float
+    misfit: float
+
+
+def _standing_out(views: Sequence[tuple[KeypointImage, FloatArray]], change: Change) -> _Standing | None:
+    """How keypoints lie on depth after a change of the pixels; None: too few limbs."""
     near, count = 0, 0
+    spreads: list[float] = []
     for image, nearest in views:
         at = {part.site: next(iter(part.weights)) for part in layout_of(image.layout).parts}
         ends = np.array([(at[above], at[below]) for above, below in LIMBS if above in at and below in at])
@@ -310,9 +340,16 @@ def _standing_out(views: Sequence[tuple[KeypointImage, FloatArray]], change: Cha
                 np.where(visible, image.camera.fx * _BESIDE_M / np.where(visible, depth, 1.0), 0.0)[:, None] * across
             )
             behind = np.maximum(_at(nearest, middle + aside), _at(nearest, middle - aside))
+            if visible.any():
+                at_person = pixels[rows[:, 2] >= _CONFIDENT]
+                spread = np.median(np.linalg.norm(at_person - np.median(at_person, axis=0), axis=1))
+                spreads.append(float(spread * np.median(depth[visible]) / image.camera.fx))
             near += int((visible & (behind > np.where(visible, depth, 0.0) + _FARTHER_M)).sum())
             count += len(a)
-    return near / count if count >= _FEWEST else None
+    if count < _FEWEST:
+        return None
+    spread = float(np.median(spreads)) if spreads else 0.0
+    return _Standing(near / count, abs(np.log(spread / _ADULT_M)) if spread > 0.0 else np.inf)
 
 
 def _nearest(image: KeypointImage, depth: DepthImage) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,22 @@ def read_people(file: Path | None, *, layout: str | None, left_out: LeftOut | No
     with leaving_out(left_out):
         return () if file is None else tuple(read_openpose_json(file, layout=layout))
     return ()
+
+
+def refuse_unread(where: object, people: Collection[FloatArray], unread: LeftOut | None) -> None:
+    """Raise an error if nothing could be read of keypoint files, though some are there.
+
+    Args:
+        where: folder of the files.
+        people: those who were read.
+        unread: files that could not be read; None: they were errors themselves.
+
+    Raises:
+        RecordingError: names the first file.
+    """
+    if unread and not people:
+        first = next(iter(unread.first.values()))
+        raise RecordingError(f"{where}: expected keypoint files with people, found some unreadable, the first: {first}")
 
 
 def read_openpose_json(path: str | Path, *, layout: str | None) -> list[FloatArray]:

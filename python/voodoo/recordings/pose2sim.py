@@ -12,7 +12,7 @@ from voodoo.errors import MeasurementError, RecordingError, naming
 from voodoo.measurements import FloatArray, KeypointImage, RecordedFrame
 from voodoo.recordings.camera_files import PlacedCamera, read_camera_toml, tables_of
 from voodoo.recordings.keypoint_check import check_keypoints, some_of, taken_layout
-from voodoo.recordings.keypoint_files import read_people
+from voodoo.recordings.keypoint_files import read_people, refuse_unread
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_trc
@@ -117,11 +117,7 @@ class Pose2SimRecording(Recording):
             good=lambda images: any(image.people for image in images),
         )
         people = [rows for instant in instants for image in instant for rows in image.people]
-        if unread and not people:
-            first = next(iter(unread.first.values()))
-            raise RecordingError(
-                f"{self.path}: expected keypoint files with people, found some unreadable, the first: {first}"
-            )
+        refuse_unread(self.path, people, unread)
         self.layout, notes = taken_layout(people, asked)
         count = layout_of(self.layout).count
         instants = [

@@ -22,7 +22,7 @@ from rosbags.typesys.store import Typestore
 from voodoo.errors import RecordingError, reading
 from voodoo.names import ROS1_SUFFIXES, ROS2_SUFFIXES
 from voodoo.recordings import realsense
-from voodoo.recordings.bag_files import BagFile, BagFolder, bag_file
+from voodoo.recordings.bag_files import BagFile, BagFolder, FolderIndex, bag_file
 from voodoo.recordings.left_out import LeftOut, leave_out
 from voodoo.recordings.mcap_file import or_error
 from voodoo.recordings.ros_messages import Message, frame_of
@@ -132,6 +132,7 @@ class Bag:
         self.path = path
         self._left_out, self._unpacked = left_out, unpacked
         self._reader: BagFile | None = None
+        self._index: FolderIndex | None = None
         folder = path
         if path.suffix.lower() == ".zip":
             self._unpacked_to = tempfile.TemporaryDirectory(prefix="voodoo-", ignore_cleanup_errors=True)
@@ -155,6 +156,7 @@ class Bag:
                     )
             if isinstance(reader, BagFolder):
                 self._check_metadata(reader)
+                self._index = reader.index
 
     @contextmanager
     def _naming(self) -> Iterator[None]:
@@ -281,7 +283,7 @@ class Bag:
                 yield self._reader
                 return
             with reading(self.path, "a complete ROS bag"):
-                reader = bag_file(self.file, Unpacking(self._unpacked, kept=False, advice=_ADVICE))
+                reader = bag_file(self.file, Unpacking(self._unpacked, kept=False, advice=_ADVICE), index=self._index)
                 reader.open()
             try:
                 yield reader

@@ -2,26 +2,50 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 
+from voodoo.errors import RecordingError
 from voodoo.measurements import Measurement, RecordedFrame
 
 FARTHEST_S = 0.25
 """An image with a larger time difference [s] belongs to no frame, even at low frame rates: the pose differs, and the tracker
 would reject the frame."""
+WAIT_S = 0.010
+"""How long a frame waits for measurements that belong to it [s]."""
 _AHEAD = 2
 
 
 def in_turn(items: Iterable[Measurement], driver: str) -> Iterator[RecordedFrame]:
-    """A frame for each measurement of one sensor, which is its last one, with those of the others since the one before."""
+    """A frame for each measurement of one sensor, which is its last one, with those of the others since the one before; in the
+    last frame also those that follow it within WAIT_S, since there is no other for them."""
     pending: list[Measurement] = []
-    for item in items:
-        pending.append(item)
-        if item.sensor == driver:
-            yield RecordedFrame(item.stamp, tuple(pending))
-            pending.clear()
+    held: RecordedFrame | None = None
+    before = -math.inf
+    try:
+        for item in items:
+            pending.append(item)
+            if item.sensor == driver:
+                if held is not None:
+                    yield held
+                    before = held.stamp
+                held = RecordedFrame(item.stamp, tuple(pending))
+                pending.clear()
+    except RecordingError:
+        if held is not None:
+            yield held
+        raise
+    if held is not None:
+        yield _with_rest(held, pending, before)
+
+
+def _with_rest(last: RecordedFrame, rest: Sequence[Measurement], before: float) -> RecordedFrame:
+    """The last frame with measurements after it, of sensors that have none in it but those that follow the frame before."""
+    own = {item.sensor for item in last.measurements if item.stamp - before > WAIT_S}
+    near = tuple(item for item in rest if item.stamp - last.stamp <= WAIT_S and item.sensor not in own)
+    return RecordedFrame(last.stamp, (*last.measurements[:-1], *near, *last.measurements[-1:]))
 
 
 def together(items: Iterable[Measurement], first: str) -> Iterator[RecordedFrame]:

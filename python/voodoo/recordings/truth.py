@@ -26,7 +26,7 @@ OWN_ROOTS = ("base_link", "world")
 """The default root frame of a recording is the first of these in its transforms; the files are in it."""
 STILL_FRAMES = ("odom", "map")
 """Fixed frames of a moving robot (REP-105): the first is smooth but drifts, the second has no drift but jumps."""
-PEOPLE_TRUTH_FILE = "truth_people.csv"
+TRUTH_FILE, PEOPLE_TRUTH_FILE = "truth.csv", "truth_people.csv"
 _FIRST = ("stamp_s", "person", "in_view")
 _LAST = np.iinfo(np.int32).max
 
@@ -104,10 +104,10 @@ def read_beside(
         RecordingError: a file that cannot be used.
     """
     own = partial(recording.root_from, root)
-    for name in ("truth.csv", PEOPLE_TRUTH_FILE, "init.json"):
+    for name in (TRUTH_FILE, PEOPLE_TRUTH_FILE, "init.json"):
         file = find(name)
         try:
-            if file is not None and name == "truth.csv":
+            if file is not None and name == TRUTH_FILE:
                 recording.reference = read_truth(file, own)
             elif file is not None and name == PEOPLE_TRUTH_FILE:
                 recording.people = read_people_truth(file, own)
