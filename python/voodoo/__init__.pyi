@@ -4,6 +4,7 @@ from voodoo import ik as ik
 from voodoo._core import ClosestPoints as ClosestPoints
 from voodoo._core import Detector as Detector
 from voodoo._core import Estimate as Estimate
+from voodoo._core import Frame as Frame
 from voodoo._core import TaperedEllipticCylinder as TaperedEllipticCylinder
 from voodoo._core import __version__ as __version__
 from voodoo.config import Config as Config
@@ -26,7 +27,6 @@ from voodoo.people import Person as Person
 from voodoo.recordings.loaders import open_recording as open_recording
 from voodoo.synthetic.render import RenderedDepth as RenderedDepth
 from voodoo.synthetic.render import render_depth as render_depth
-from voodoo.tracker import Frame as Frame
 from voodoo.tracker import Tracker as Tracker
 
 def __getattr__(name: str) -> Any: ...  # noqa: ANN401 - whatever the name stands for

@@ -96,6 +96,13 @@ def nearest_surface(
         MeasurementError: arrays of other shapes.
     """
 
+def implausible_depth(image: npt.NDArray[np.uint16] | npt.NDArray[np.float32], meters_per_unit: float) -> float | None:
+    """The median depth of a sample of an image's pixels [m] if no camera measures it, so that the unit is wrong.
+
+    Raises:
+        MeasurementError: an array of another type.
+    """
+
 def linear_sum_assignment(costs: npt.NDArray[np.float64]) -> list[tuple[int, int]]:
     """Pairs (row, column) that minimize the sum of finite costs (N, M), ordered by row.
 
@@ -523,6 +530,9 @@ class Frame:
 
         Raises:
             MeasurementError: wrong shape or dtype, no calibration, or no rigid transform.
+
+        Warns:
+            UnitWarning: the median depth is below 1 cm or beyond 100 m, so that `meters_per_unit` is wrong.
         """
     def add_color(
         self,
@@ -730,13 +740,13 @@ class Estimate:
         """Names of the rows of limb_poses."""
     @property
     def joint_positions(self) -> npt.NDArray[np.float64]:
-        """Positions (J, 3) [m] of all joints and sites; J = 0 before the first reset."""
+        """Positions (J, 3) [m] of all sites; J = 0 before the first reset."""
     @property
     def limb_poses(self) -> npt.NDArray[np.float64]:
         """world_from_limb (L, 4, 4) of all limbs."""
     @property
     def joints(self) -> Mapping[str, npt.NDArray[np.float64]]:
-        """Position (3,) [m] of every named joint and site."""
+        """Position (3,) [m] of every site."""
     @property
     def world_from_limb(self) -> Mapping[str, npt.NDArray[np.float64]]:
         """Pose (4, 4) of every limb."""
@@ -751,13 +761,13 @@ class Estimate:
         first frame, {} while searching. From 0.8 on the limb's status is "measured"."""
     @property
     def covariance(self) -> Mapping[str, npt.NDArray[np.float64]]:
-        """Covariance (3, 3) [m^2] of the position of every joint and site, world frame; NaN before the first frame."""
+        """Covariance (3, 3) [m^2] of the position of every site, world frame; NaN before the first frame."""
     @property
     def joint_covariances(self) -> npt.NDArray[np.float64]:
         """The covariances of `covariance` as an array (J, 3, 3) in the order of joint_names."""
     @property
     def joint_sigma(self) -> Mapping[str, npt.NDArray[np.float64]]:
-        """Standard deviation (3,) [m] of every joint's and site's x, y and z in the world."""
+        """Standard deviation (3,) [m] of every site's x, y and z in the world."""
     @property
     def limb_covariance(self) -> Mapping[str, npt.NDArray[np.float64]]:
         """Covariance (6, 6) of the pose of every limb: x, y, z [m], then rotations about the world's x, y, z [rad] through the

@@ -21,10 +21,6 @@ ROUNDED_S = 1e-6
 """Times that differ by less are the same, one of them rounded or computed."""
 MARKER_SIGMA_M = 0.02
 """Standard deviation of a marker of which it is not known [m]."""
-MEASURED_M = (0.01, 100.0)
-"""Median depths that cameras measure [m]; meters taken for millimeters are below, and millimeters taken for meters beyond."""
-_STRIDE = 16
-"""Every n-th row and column suffices for a median depth."""
 _LARGEST = float(np.finfo(np.float64).max)
 
 
@@ -57,18 +53,6 @@ class DepthImage:
         """One line with size and type instead of the pixels."""
         height, width = self.image.shape
         return f"DepthImage({self.sensor!r}, stamp={self.stamp:.6f}, {width}x{height} {self.image.dtype})"
-
-
-def implausible_depth(image: DepthArray, meters_per_unit: float) -> float | None:
-    """Median of some depths of an image [m] if no camera measures it, so that the unit is wrong; None: it may be right."""
-    observed = image[::_STRIDE, ::_STRIDE]
-    returned = observed[np.isfinite(observed) & (observed > 0)]
-    if not returned.size:
-        return None
-    half = len(returned) // 2
-    median = float(np.partition(returned, half)[half]) * meters_per_unit  # np.median takes twice as long
-    low, high = MEASURED_M
-    return None if low <= median <= high else median
 
 
 @dataclass(frozen=True, eq=False, repr=False)

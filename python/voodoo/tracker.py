@@ -3,46 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import wraps
-from inspect import signature
-from typing import Any, NamedTuple
-from warnings import warn
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 import voodoo._core as _core
-from voodoo._core import Estimate, TaperedEllipticCylinder
-from voodoo._core import Frame as Frame
+from voodoo._core import Estimate, Frame, TaperedEllipticCylinder
 from voodoo.config import Config
 from voodoo.detectors.base import AnyDetector
-from voodoo.errors import BodyError, ConfigError, MeasurementError, UnitWarning, of_kind, one_thread
-from voodoo.measurements import MEASURED_M, DepthArray, implausible_depth
+from voodoo.errors import BodyError, ConfigError, MeasurementError, of_kind, one_thread
 from voodoo.model.body import Body, Joint, checked_joints, ordered_poses
 from voodoo.model.joint import number_of
-
-_add_depth = Frame.add_depth
-_DEFAULTS = {name: option.default for name, option in signature(_add_depth).parameters.items()}
-
-
-@wraps(_add_depth)
-def _doubting(self: Frame, image: DepthArray, **options: Any) -> None:  # noqa: ANN401 - those of the compiled method
-    _add_depth(self, image, **options)
-    given = {**_DEFAULTS, **options}
-    unit = float(given["meters_per_unit"])
-    if implausible_depth(image, unit) is not None:
-        low, high = MEASURED_M
-        # The same words in every frame: Python shows them once.
-        warn(
-            f"{given['source']}: expected depths between {low:g} and {high:g} m, found others with meters_per_unit={unit:g}, "
-            "which is 0.001 for an image in millimeters and 1.0 for one in meters",
-            UnitWarning,
-            stacklevel=2,
-        )
-
-
-# The compiled class cannot be derived from, and a wrong unit would be searched in vain without a word.
-Frame.add_depth = _doubting  # type: ignore[method-assign]
 
 
 class RegionLines(NamedTuple):

@@ -43,7 +43,7 @@ mod _core {
         camera::{PyCamera, render_depth},
         config::config_fields,
         estimate::{_estimate, PyEstimate},
-        frame::PyFrame,
+        frame::{PyFrame, implausible_depth},
         ik::{PyChain, PyView},
         keypoints::{PyKeypointLayout, carried, linear_sum_assignment, nearest_surface},
         people::PyPeople,

@@ -11,16 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from voodoo._core import implausible_depth
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.live.source import Arrival, Faults
-from voodoo.measurements import (
-    MEASURED_M,
-    ColorImage,
-    DepthImage,
-    Measurement,
-    RecordedFrame,
-    implausible_depth,
-)
+from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.model.camera import Camera
 from voodoo.pipeline.frozen import unchanged
 from voodoo.recordings.recording import refuse_blank
@@ -280,6 +274,5 @@ class Assembler:
     def _refuse_unit(self, item: DepthImage) -> None:
         found = implausible_depth(item.image, item.meters_per_unit)
         if found is not None:
-            where, (low, high) = f"{item.sensor}, stamp {item.stamp:.6f}", MEASURED_M
-            expected = f"expected depths between {low:g} and {high:g} m"
+            where, expected = f"{item.sensor}, stamp {item.stamp:.6f}", "expected depths between 1 cm and 100 m"
             raise RecordingError(f"{where}: {expected}, found a median of {found:.3g} m", reason="wrong unit")

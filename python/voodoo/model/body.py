@@ -55,7 +55,7 @@ class Body:
         limb_names: names of the limbs, parents first.
         limb_tree: of each limb the name, and the number of its parent; None for the root.
         limb_joints: of each limb the name of its joint to the parent; None for the root.
-        site_names: names of the joints and sites that have a position.
+        site_names: names of the sites.
     """
 
     name: str

@@ -8,6 +8,11 @@ use crate::error::{TrackError, Unexpected};
 use crate::math::{Aabb, Pose, Vec3, is_place, is_rigid};
 use crate::observation::picture::ColorImage;
 
+/// Median depths that cameras measure, meters: meters taken for millimeters are below, and millimeters taken for meters beyond.
+const MEASURED: std::ops::RangeInclusive<f64> = 0.01..=100.0;
+/// Number of pixels that suffice for a median depth.
+const MEDIAN_SAMPLE: usize = 256;
+
 /// Three-dimensional points in the caller's memory layout, in meters.
 ///
 /// [`Cloud`] has an example.
@@ -120,6 +125,26 @@ impl DepthPixels<'_> {
             Self::U16(pixels) => f32::from(pixels[index]),
             Self::F32(pixels) => pixels[index],
         }
+    }
+
+    /// The median depth of a sample of the pixels, meters, if no camera measures it, so that `meters_per_unit` is wrong; `None` if
+    /// it may be right.
+    ///
+    /// ```
+    /// use voodoo_core::DepthPixels;
+    ///
+    /// let meters = DepthPixels::F32(&[2.5; 12]);
+    /// assert_eq!([0.001, 1.0].map(|unit| meters.implausible_depth(unit)), [Some(0.0025), None]);
+    /// ```
+    pub fn implausible_depth(&self, meters_per_unit: f64) -> Option<f64> {
+        let mut sample = [0.0; MEDIAN_SAMPLE];
+        // An odd step, so that the sample has pixels of all columns.
+        let step = (self.len() / MEDIAN_SAMPLE) | 1;
+        let returns = (0..self.len()).step_by(step).map(|index| self.get(index)).filter(|z| *z > 0.0 && z.is_finite());
+        let count = sample.iter_mut().zip(returns).map(|(place, z)| *place = z).count();
+        let returned = sample.get_mut(..count).filter(|returned| !returned.is_empty())?;
+        let median = f64::from(*returned.select_nth_unstable_by(count / 2, f32::total_cmp).1) * meters_per_unit;
+        (!MEASURED.contains(&median)).then_some(median)
     }
 }
 
