@@ -1,14 +1,16 @@
 """voodoo info: what is told of a recording before it is tracked."""
 
 import json
+import math
 
 import cv2
 import numpy as np
 import pytest
 
 from commands import run
+from voodoo.batch.task import Job, Settings, _track
 from voodoo.recordings import RecordingInfo, sample_path
-from voodoo.recordings.first_images import warnings
+from voodoo.recordings.first_images import FirstFrames, doubts, warnings
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.recording import SensorInfo
 
@@ -72,3 +74,34 @@ def test_focal_lengths_that_no_depth_camera_has_are_doubted(folder):
     calibration.write_text(calibration.read_text().replace("fx=40", "fx=525"))
     said = " ".join(run("info", path).stdout.split())
     assert "depth sees 9 x 89 deg by its calibration, and depth cameras 40 to 120: are its focal lengths right?" in said
+
+
+@pytest.mark.parametrize(
+    ("interval", "words"),
+    [
+        (0.033, None),
+        (1.0, None),
+        (math.nan, None),
+        (33.4, "milliseconds"),
+        (33367.0, "microseconds"),
+        (1e-5, "seconds"),
+    ],
+)
+def test_rates_that_no_recording_has_are_doubted(interval, words):
+    found = doubts(FirstFrames(interval=interval))
+    assert len(found) == (words is not None) and all(f"are the stamps in {words}?" in one for one in found)
+
+
+def test_stamps_of_a_wrong_unit_are_told_by_every_command(folder):
+    path = folder(80, 60)
+    for index in range(3):
+        (path / f"depth/{index}.png").rename(path / f"depth/{1000.0 + 33.4 * index:.1f}.png")
+    words = "frames are 33.4 s apart: are the stamps in milliseconds? (--option seconds_per_unit=0.001 of a folder of images)"
+    assert f"note       {words}" in run("info", path).stdout
+    assert words in run("track", path, "--out", path.parent / "o.csv").stderr
+    right = run("track", path, "--option", "seconds_per_unit=0.001", "--out", path.parent / "o.csv")
+    assert "apart" not in right.stderr
+    row, _ = _track(Job("a", str(path), str(path.parent), Settings()), path)
+    assert row.doubts == words
+    said = run("live", path, "--rate", 1000, "--duration", 0.1).stderr
+    assert f"{path.name}: {words}" in " ".join(said.split())

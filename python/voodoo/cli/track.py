@@ -17,6 +17,7 @@ from voodoo.names import SEARCHING
 
 if TYPE_CHECKING:
     from voodoo.export.spool import Spool
+    from voodoo.recordings.first_images import DepthRange
     from voodoo.recordings.left_out import LeftOut
     from voodoo.recordings.recording import Recording, RecordingInfo
 
@@ -118,6 +119,7 @@ def track_command(
     from voodoo.pipeline.run import TrackedFrame, track
     from voodoo.pipeline.start import AUTO, starts_of, used_kinds
     from voodoo.pipeline.start import stature as stature_of
+    from voodoo.recordings.first_images import doubts, first_frames
     from voodoo.recordings.left_out import LeftOut
     from voodoo.recordings.marker_files import MarkerMap
     from voodoo.visualization.rerun_viewer import Viewer
@@ -142,7 +144,8 @@ def track_command(
     about |= {"left_out": left_out, "bare": bare}
     first = opened(recording, replace(reading, layout=None, option=None), left_out=left_out, bare=bare, **asked)
     source = join(first, keypoints=folders, network=network, others=others, offset=offset, **about)
-    for words in source.assumed:
+    ahead = first_frames(first, left_out=left_out)
+    for words in (*source.assumed, *(f"{source.name}: {doubt}" for doubt in doubts(ahead))):
         print_message(words)
     for name, given in (("draw-regions", draw_regions), ("background", background)) if several else ():
         if given:
@@ -202,27 +205,25 @@ def track_command(
     begun = spool.states - Counter({SEARCHING: 0 if start.beginning in (None, AUTO) else len(source)})
     for remark in closing_remarks(begun, stature=size, height_m=height_m) if spool.found and not several else ():
         print_message(f"{source.name}: {remark}")
-    _print_warnings(source, spool, left_out, refusals)
+    _print_warnings(source, spool, left_out, refusals, ahead.depths)
 
 
-def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None, refusals: Counter[str]) -> None:
+def _print_warnings(
+    source: Recording, spool: Spool, left_out: LeftOut | None, refusals: Counter[str], depth: DepthRange | None
+) -> None:
     """Print on stderr what was left out, and possible reasons if no person was tracked.
 
     Raises:
         NoPoseError: nobody was found.
     """
-    from voodoo.recordings.first_images import depths_of, first_images
-
     if left_out is not None:
         for reason, count in left_out.counts.items():
             first = left_out.first[reason]
             print_message(f"{source.name}: left out {count} {reason} (the first: {first}); --strict refuses them")
         for note in left_out.notes:
             print_message(f"{source.name}: {note}")
-    if not {"tracking", "degraded"} & spool.states.keys():
-        depth = depths_of(first_images(source)[0])
-        if depth is not None and depth.warning:
-            print_message(f"{source.name}: {depth.warning}")
+    if depth is not None and depth.warning and not {"tracking", "degraded"} & spool.states.keys():
+        print_message(f"{source.name}: {depth.warning}")
     if not spool.found:
         if refusals:
             words = refusals.most_common(1)[0][0]
