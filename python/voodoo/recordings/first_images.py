@@ -21,6 +21,8 @@ _FRAMES = 10
 """Frames in which the first images are looked for."""
 _LEAST_DEG, _MOST_DEG = 30.0, 150.0
 """Fields of view that depth cameras have."""
+_SQUARE = 0.1
+"""Focal lengths of a depth camera that differ by a larger fraction are not of one image: its pixels are square."""
 _NEAR_M, _FAR_M = 1.2, 8.0
 """Plausible depths of a camera that observes a person: some are beyond the first limit, and the median is below the second."""
 FIXED_FRAMES = (*STILL_FRAMES, "world")
@@ -61,6 +63,7 @@ class FirstImage:
         bits: of a value, e.g. "16-bit unsigned".
         meters_per_unit: scale of depth; None for color.
         field_of_view: horizontal and vertical [deg], by the calibration.
+        focal_lengths: horizontal and vertical [px].
         depths: their range; None for color, and where nothing returned.
     """
 
@@ -70,6 +73,7 @@ class FirstImage:
     bits: str
     meters_per_unit: float | None
     field_of_view: tuple[float, float]
+    focal_lengths: tuple[float, float]
     depths: DepthRange | None = None
 
     def __str__(self) -> str:
@@ -136,6 +140,7 @@ def _of(item: DepthImage | ColorImage) -> FirstImage:
         bits=f"{8 * image.dtype.itemsize}-bit {kind}",
         meters_per_unit=item.meters_per_unit if isinstance(item, DepthImage) else None,
         field_of_view=(next(angles), next(angles)),
+        focal_lengths=(camera.fx, camera.fy),
         depths=_range_of(item.meters()) if isinstance(item, DepthImage) else None,
     )
 
@@ -145,14 +150,22 @@ def _range_of(meters: FloatArray) -> DepthRange | None:
     return DepthRange(*np.percentile(known, (5.0, 50.0, 95.0)).tolist()) if known.size else None
 
 
+def _lens_words(image: FirstImage) -> str:
+    """What is unlikely in the calibration of a depth camera; "" if nothing."""
+    (across, down), (fx, fy) = image.field_of_view, image.focal_lengths
+    if not _LEAST_DEG < across < _MOST_DEG:
+        what = f"sees {across:.0f} x {down:.0f} deg by its calibration, and depth cameras 40 to 120"
+    elif abs(fx - fy) > _SQUARE * max(fx, fy):
+        what = f"has focal lengths of {fx:.0f} and {fy:.0f} px by its calibration, and those of depth cameras are nearly equal"
+    else:
+        return ""
+    return f"{image.sensor} {what}: are its focal lengths right?"
+
+
 def doubts(first: FirstFrames) -> list[str]:
     """What is unlikely in times and calibration: it gives wrong speeds, or a wrong person."""
     found = [interval_words(first.interval)]
-    for image in first.images:
-        across, down = image.field_of_view
-        if image.meters_per_unit is not None and not _LEAST_DEG < across < _MOST_DEG:
-            words = f"{image.sensor} sees {across:.0f} x {down:.0f} deg by its calibration, and depth cameras 40 to 120"
-            found.append(f"{words}: are its focal lengths right?")
+    found += [_lens_words(image) for image in first.images if image.meters_per_unit is not None]
     return [words for words in found if words]
 
 
