@@ -37,7 +37,7 @@ class Row:
         joint_error_m: mean error of the twelve joints if there is ground truth or a reference: see `voodoo eval` [m].
         left_out: number of unusable measurements.
         source: path or URL.
-        doubts: what is unlikely in its times and calibration; "" if nothing.
+        doubts: what is unlikely in its stamps, calibration and poses; "" if nothing.
     """
 
     recording: str

@@ -116,10 +116,10 @@ def track_command(
     from voodoo.export.files import upright_words
     from voodoo.export.upright import lying_words
     from voodoo.pipeline.inputs import join, keypoint_words, loader_options
+    from voodoo.pipeline.inspection import inspect
     from voodoo.pipeline.run import TrackedFrame, track
     from voodoo.pipeline.start import AUTO, starts_of, used_kinds
     from voodoo.pipeline.start import stature as stature_of
-    from voodoo.recordings.first_images import doubts, first_frames
     from voodoo.recordings.left_out import LeftOut
     from voodoo.recordings.marker_files import MarkerMap
     from voodoo.visualization.rerun_viewer import Viewer
@@ -144,8 +144,8 @@ def track_command(
     about |= {"left_out": left_out, "bare": bare}
     first = opened(recording, replace(reading, layout=None, option=None), left_out=left_out, bare=bare, **asked)
     source = join(first, keypoints=folders, network=network, others=others, offset=offset, **about)
-    ahead = first_frames(first, left_out=left_out)
-    for words in (*source.assumed, *(f"{source.name}: {doubt}" for doubt in doubts(ahead))):
+    seen = inspect(first, left_out=left_out)
+    for words in (*source.assumed, *(f"{source.name}: {doubt}" for doubt in seen.doubts)):
         print_message(words)
     for name, given in (("draw-regions", draw_regions), ("background", background)) if several else ():
         if given:
@@ -205,7 +205,7 @@ def track_command(
     begun = spool.states - Counter({SEARCHING: 0 if start.beginning in (None, AUTO) else len(source)})
     for remark in closing_remarks(begun, stature=size, height_m=height_m) if spool.found and not several else ():
         print_message(f"{source.name}: {remark}")
-    _print_warnings(source, spool, left_out, refusals, ahead.depths)
+    _print_warnings(source, spool, left_out, refusals, seen.first.depths)
 
 
 def _print_warnings(
