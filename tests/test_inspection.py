@@ -92,3 +92,11 @@ def test_what_is_looked_at_twice_is_counted_once(folder):
         cv2.imwrite(str(file), np.zeros((144, 176), np.uint16))
     assert "left out 4 that are blank" in run("info", path).stdout
     assert "left out 4 that are blank" in run("track", path, "--out", path.parent / "o.csv").stderr
+
+
+def test_who_is_not_tracked_for_their_size_is_told_with_it(folder):
+    path = folder("right", scale=0.5)
+    said = " ".join(run("track", path, "--out", path.parent / "o.csv").stderr.split())
+    assert "the floor that depth shows is 0.6 m above z = 0 of base_link" in said
+    assert "though depth shows somebody 0.86 m tall: are the unit of depth and the pose of the camera right?" in said
+    assert "log odds" not in said and "voodoo info" not in said
