@@ -179,7 +179,7 @@ def track_command(
         with deferred():
             done = run(source, steps, take=take, **how)
             sample = spool.sample()
-            turn = turn_of(source, sample, spool.paths, upright=upright)
+            turn = turn_of(source, sample, spool.paths, upright=upright, left_out=left_out)
             files, failed = spool.write(turn=turn, left_out=None if left_out is None else left_out.counts)
     turned = upright_words(files, turn, every=upright)
     if several:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from itertools import islice
 
 import numpy as np
@@ -86,20 +86,21 @@ class FloorSight:
         return (normal, height) if alike.mean() > 0.5 else None
 
 
-def _look(recording: Recording, *, up: tuple[float, float, float] | None) -> FloorSight:
-    """What a recording shows in its first seconds."""
+def _look(
+    recording: Recording, *, up: tuple[float, float, float] | None, left_out: LeftOut | None = None
+) -> FloorSight:
+    """What a recording shows in its first seconds; `left_out`: that of the recording, which does not count what is read."""
     sight = FloorSight(up=up)
-    try:
+    # Tracking reports damage; what was seen before it counts.
+    with nullcontext() if left_out is None else left_out.aside(), suppress(VoodooError):
         for recorded in islice(recording, 0, _FRAMES, EVERY):
             sight.observe(recorded)
-    except VoodooError:
-        pass  # tracking reports damage; what was seen before it counts
     return sight
 
 
-def visible_floor(recording: Recording) -> tuple[FloatArray, float] | None:
-    """The floor that a recording shows in its first seconds, in the root frame; see `FloorSight`."""
-    return _look(recording, up=None if recording.info().camera_root else _UP).floor
+def visible_floor(recording: Recording, *, left_out: LeftOut | None = None) -> tuple[FloatArray, float] | None:
+    """The floor that a recording shows in its first seconds, in the root frame; see `FloorSight` and `look`."""
+    return _look(recording, up=None if recording.info().camera_root else _UP, left_out=left_out).floor
 
 
 def look(recording: Recording, *, left_out: LeftOut | None = None) -> FloorSight:
@@ -109,10 +110,9 @@ def look(recording: Recording, *, left_out: LeftOut | None = None) -> FloorSight
         recording: is read from its start.
         left_out: that of the recording, which does not count what is read here.
     """
-    with nullcontext() if left_out is None else left_out.aside():
-        if not recording.info().camera_root and (sight := _look(recording, up=_UP)).planes:
-            return sight
-        return _look(recording, up=None)  # upwards in the images
+    if not recording.info().camera_root and (sight := _look(recording, up=_UP, left_out=left_out)).planes:
+        return sight
+    return _look(recording, up=None, left_out=left_out)  # upwards in the images
 
 
 def floor_words(floor: tuple[FloatArray, float] | None, root_frame: str) -> str:
