@@ -2,8 +2,10 @@
 
 from collections import Counter
 
+import voodoo
 from commands import run
-from voodoo.cli.track import closing_remarks
+from scene import standing_joints
+from voodoo.cli.track import closing_remarks, nobody_words, refusal_words
 from voodoo.recordings import sample_path
 
 
@@ -31,3 +33,20 @@ def test_unlikely_results_are_doubted():
     assert closing_remarks(good, stature=0.7, height_m=0.7) == [], "a small child was announced"
     assert "50 % of the frames" in closing_remarks(Counter(tracking=5, lost=5), stature=1.7, height_m=None)[0]
     assert closing_remarks(Counter(tracking=6, lost=4), stature=1.7, height_m=None) == []
+
+
+def test_where_nobody_is_found_the_last_line_says_what_was_seen_and_what_to_do():
+    told = {"stature": None, "doubted": False, "drawn": False}
+    assert nobody_words(9, **told) == "nobody was found in 9 frames; --overlay look.mp4 shows what the cameras see"
+    assert nobody_words(9, **told | {"drawn": True}) == "nobody was found in 9 frames"
+    assert "what is doubted above" in nobody_words(9, **told | {"doubted": True})
+    assert "depth shows somebody 0.83 m tall: are the unit of depth" in nobody_words(9, **told | {"stature": 0.834})
+
+
+def test_a_refusal_is_told_without_odds():
+    people = voodoo.People(detector=None)
+    frame = voodoo.Frame(0.0)
+    frame.add_detection(standing_joints(voodoo.Body.human(1.75)), log_odds=2.5)
+    people.step(frame)
+    assert "log odds" in people.refusal and refusal_words(people.refusal).endswith("sure enough that it is one")
+    assert refusal_words("a body that fits nothing") == "a body that fits nothing"

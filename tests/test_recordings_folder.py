@@ -322,3 +322,54 @@ def test_a_lens_in_yaml_is_the_one_it_names(folder, written, model):
             open_recording(folder)
     else:
         assert next(iter(open_recording(folder))).measurements[0].camera.model == model
+
+
+def renamed(folder, names):
+    for name, file in zip(names, sorted((folder / "depth").iterdir()), strict=True):
+        file.rename(file.with_name(f"{name}.png"))
+
+
+@pytest.mark.parametrize(
+    "stamps",
+    [
+        ("1305031102160", "1305031102193", "1305031102227"),
+        ("1305031102160.4", "1305031102193.7", "1305031102227.1"),
+        ("1305031102160407000", "1305031102193741000", "1305031102227074000"),
+    ],
+)
+@pytest.mark.parametrize("listed", [False, True])
+def test_times_since_1970_tell_their_unit_in_names_and_lists(folder, stamps, listed):
+    if listed:
+        lines = [f"{stamp} depth/{name}.png\n" for stamp, name in zip(stamps, STAMPS, strict=True)]
+        (folder / "depth.txt").write_text("".join(lines))
+    else:
+        renamed(folder, stamps)
+    found = [frame.stamp for frame in open_recording(folder)]
+    np.testing.assert_allclose(np.subtract(found, 1305031102.0), (0.16, 0.193, 0.227), atol=1e-3)
+
+
+@pytest.mark.parametrize("listed", [False, True])
+@pytest.mark.parametrize("texts", [("1000", "1033", "1067"), ("1000.0", "1033.4", "1066.7")])
+def test_the_unit_of_stamps_can_be_told(folder, listed, texts):
+    if listed:
+        lines = [f"{stamp} depth/{name}.png\n" for stamp, name in zip(texts, STAMPS, strict=True)]
+        (folder / "depth.txt").write_text("".join(lines))
+    else:
+        renamed(folder, texts)
+    recording = open_recording(folder, seconds_per_unit=0.001)
+    np.testing.assert_allclose([frame.stamp for frame in recording], (1.0, 1.033, 1.067), atol=1e-3)
+    assert recording.assumed == ()
+    with pytest.raises(RecordingError, match="seconds_per_unit: expected seconds > 0, found -1"):
+        open_recording(folder, seconds_per_unit=-1)
+
+
+@pytest.mark.parametrize(
+    ("step", "words"),
+    [(1, ""), (2, ""), (33, "milliseconds, --option seconds_per_unit=0.001"), (33333, "microseconds")],
+)
+def test_numbers_that_rise_like_a_clock_are_doubted(folder, step, words):
+    renamed(folder, [f"{100 + index * step:06d}" for index in range(3)])
+    (said,) = open_recording(folder).assumed
+    assert f"the numbers rise by {step:d}: if they are times in {words}" in said if words else "rise" not in said
+    (said,) = open_recording(folder, rate=15.0).assumed
+    assert said == "depth/ is numbered, and taken for 15 images/s", "who gives a rate knows what they count"

@@ -37,6 +37,7 @@ class Row:
         joint_error_m: mean error of the twelve joints if there is ground truth or a reference: see `voodoo eval` [m].
         left_out: number of unusable measurements.
         source: path or URL.
+        doubts: what is unlikely in its stamps, calibration and poses; "" if nothing.
     """
 
     recording: str
@@ -50,6 +51,7 @@ class Row:
     joint_error_m: float = math.nan
     left_out: int = 0
     source: str = ""
+    doubts: str = ""
 
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> Row:

@@ -27,6 +27,7 @@ from voodoo.export.track import Track
 from voodoo.model.body import Body
 from voodoo.people import PeopleEstimate, everybody
 from voodoo.pipeline.inputs import pictures_alone
+from voodoo.pipeline.inspection import inspect
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import AUTO, start_people, start_tracker
 from voodoo.recordings.left_out import LeftOut, no_frame
@@ -207,6 +208,7 @@ def _track(job: Job, path: Path) -> tuple[Row, list[Columns]]:
     left_out = None if chosen.strict else LeftOut()
     options = {"loader": chosen.loader, **(chosen.options or {})} | pictures_alone(path, chosen.loader, chosen.use)
     recording = open_recording(path, left_out=left_out, bare=False, **options)
+    doubts = inspect(recording, left_out=left_out).doubts
     settings = FrontEndSettings.of(recording, use=chosen.use)
     config = Config(**dict(chosen.config or {}))
     one_only = chosen.people == 1
@@ -234,6 +236,7 @@ def _track(job: Job, path: Path) -> tuple[Row, list[Columns]]:
         joint_error_m=error,
         left_out=0 if left_out is None else len(left_out),
         source=job.source,
+        doubts="; ".join(doubts),
     )
     return row, columns
 

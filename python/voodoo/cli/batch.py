@@ -101,6 +101,8 @@ def batch_command(
                 try:
                     for row in progressing(rows, "tracking", len(batch.jobs)):
                         batch.take(row)
+                        if row.doubts:
+                            print_message(f"{row.recording}: {row.doubts}")
                         if row.status == FAILED:
                             print_message(f"{row.recording}: {row.error}")
                         elif not row.persons:

@@ -78,7 +78,7 @@ StrictOption = Annotated[
         "--strict", help="Reject a damaged recording; by default unusable measurements are left out and counted."
     ),
 ]
-NUMBERS = ("rate", "meters_per_unit", "tf_max_age", "unpacked_gb")
+NUMBERS = ("rate", "meters_per_unit", "tf_max_age", "unpacked_gb", "seconds_per_unit")
 """Options of loaders that are numbers."""
 
 KeypointsOption = Annotated[
@@ -185,7 +185,7 @@ class Reading:
             metavar="NAME=NUMBER",
             help="Of the loader: rate (Pose2Sim, 60 images/s; numbered images, 30), meters_per_unit "
             "(depth of bags; calibrations of Pose2Sim and videos), "
-            "tf_max_age (bags, 0.5 s), unpacked_gb (bags, 2); repeatable.",
+            "tf_max_age (bags, 0.5 s), unpacked_gb (bags, 2), seconds_per_unit (stamps of images); repeatable.",
         ),
     ] = None
     layout: Annotated[

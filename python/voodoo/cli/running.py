@@ -211,7 +211,14 @@ def spool_of(
     return Spool(targets, root_frame=lambda: source.root_frame, together=TOGETHER, **how)
 
 
-def turn_of(source: Recording, tracks: Sequence[Track], targets: Sequence[Path], *, upright: bool = False) -> Turn:
+def turn_of(
+    source: Recording,
+    tracks: Sequence[Track],
+    targets: Sequence[Path],
+    *,
+    upright: bool = False,
+    left_out: LeftOut | None = None,
+) -> Turn:
     """How files are turned upright whose root frame is a camera's: by the floor that is seen, else by its axes.
 
     Args:
@@ -219,12 +226,13 @@ def turn_of(source: Recording, tracks: Sequence[Track], targets: Sequence[Path],
         tracks: its results.
         targets: the files.
         upright: turn any root frame to z up and put the feet on z = 0; one that is known to be so stays.
+        left_out: that of the recording, which does not count again what is read again.
     """
     root, optical = source.root_frame, source.info().camera_root
     stands = root in LEVEL_FRAMES and not optical and not any(lying_words(track, root) for track in tracks)
     if stands or not (upright or (optical and not all(map(is_table, targets)))):
         return by_axes(root, optical=optical)
-    floor = visible_floor(source)
+    floor = visible_floor(source, left_out=left_out)
     if floor is not None:
         return by_floor(floor, optical=optical)
     return by_feet(tracks, root, optical=optical) if upright else by_axes(root, optical=optical)

@@ -20,15 +20,16 @@ def info_command(
     """Print the contents of a recording: sensors, topics, frames, rates, root frame and reference, and of the first image of each
     camera size, bits, calibration, field of view and range of depths."""
     from voodoo.cli.running import opened
-    from voodoo.recordings.first_images import depths_of, first_images, warnings
+    from voodoo.pipeline.inspection import inspect
+    from voodoo.recordings.first_images import warnings
     from voodoo.recordings.left_out import LeftOut
 
     left_out = LeftOut()
     source = opened(recording, reading, left_out=left_out)
     about = source.info()
-    images, damage = first_images(source)
-    depth = depths_of(images)
-    notes = [*warnings(about, left_out, images), damage, "" if depth is None else depth.warning]
+    seen = inspect(source, left_out=left_out, count=True)
+    images, depth = seen.first.images, seen.first.depths
+    notes = [*seen.doubts, *warnings(about, left_out), seen.first.damage, "" if depth is None else depth.warning]
     if as_json:
         print_json(
             {**vars(about), "camera_root": about.camera_root, "images": images, "depths": depth}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -16,9 +17,8 @@ from voodoo.errors import NoPoseError, VoodooError
 from voodoo.names import SEARCHING
 
 if TYPE_CHECKING:
-    from voodoo.export.spool import Spool
     from voodoo.recordings.left_out import LeftOut
-    from voodoo.recordings.recording import Recording, RecordingInfo
+    from voodoo.recordings.recording import RecordingInfo
 
 
 def track_command(
@@ -114,7 +114,9 @@ def track_command(
     from voodoo.cli.running import ParsedTracking, opened, refuse_unused, run, spool_of, turn_of
     from voodoo.export.files import upright_words
     from voodoo.export.upright import lying_words
+    from voodoo.pipeline.floor import look
     from voodoo.pipeline.inputs import join, keypoint_words, loader_options
+    from voodoo.pipeline.inspection import inspect
     from voodoo.pipeline.run import TrackedFrame, track
     from voodoo.pipeline.start import AUTO, starts_of, used_kinds
     from voodoo.pipeline.start import stature as stature_of
@@ -142,7 +144,8 @@ def track_command(
     about |= {"left_out": left_out, "bare": bare}
     first = opened(recording, replace(reading, layout=None, option=None), left_out=left_out, bare=bare, **asked)
     source = join(first, keypoints=folders, network=network, others=others, offset=offset, **about)
-    for words in source.assumed:
+    seen = inspect(first, left_out=left_out)
+    for words in (*source.assumed, *(f"{source.name}: {doubt}" for doubt in seen.doubts)):
         print_message(words)
     for name, given in (("draw-regions", draw_regions), ("background", background)) if several else ():
         if given:
@@ -170,13 +173,13 @@ def track_command(
         refusals: Counter[str] = Counter()
 
         def take(step: TrackedFrame[Any]) -> None:
-            refusals.update([tracker.refusal] if tracker.refusal else [])
+            refusals.update([refusal_words(tracker.refusal)] if tracker.refusal else [])
             spool.add(step.estimate, step.front_end.bodies)
 
         with deferred():
             done = run(source, steps, take=take, **how)
             sample = spool.sample()
-            turn = turn_of(source, sample, spool.paths, upright=upright)
+            turn = turn_of(source, sample, spool.paths, upright=upright, left_out=left_out)
             files, failed = spool.write(turn=turn, left_out=None if left_out is None else left_out.counts)
     turned = upright_words(files, turn, every=upright)
     if several:
@@ -202,34 +205,57 @@ def track_command(
     begun = spool.states - Counter({SEARCHING: 0 if start.beginning in (None, AUTO) else len(source)})
     for remark in closing_remarks(begun, stature=size, height_m=height_m) if spool.found and not several else ():
         print_message(f"{source.name}: {remark}")
-    _print_warnings(source, spool, left_out, refusals)
+    _print_left_out(source.name, left_out)
+    depth = "" if seen.first.depths is None else seen.first.depths.warning
+    if depth and not {"tracking", "degraded"} & spool.states.keys():
+        print_message(f"{source.name}: {depth}")
+    if spool.found:
+        return
+    for words, count in refusals.most_common(1):
+        print_message(f"{source.name}: what may be a person was seen in {count} frames and not tracked: {words}")
+    kinds = used_kinds(source, used.use)
+    # Who is excluded, or seen by a camera that is not used, is not who is missing.
+    sight = (seen.sight or look(first, left_out=left_out)) if "depth" in kinds and not used.exclude else None
+    words = nobody_words(
+        spool.frames,
+        stature=median(sight.statures) if sight is not None and sight.statures else None,
+        doubted=bool(depth or seen.doubts),
+        drawn=overlay is not None or not kinds & {"depth", "color"},
+    )
+    raise NoPoseError(f"{source.name}: {words}")
 
 
-def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None, refusals: Counter[str]) -> None:
-    """Print on stderr what was left out, and possible reasons if no person was tracked.
+def _print_left_out(name: str, left_out: LeftOut | None) -> None:
+    """Print on stderr what was left out of a recording, and what else to know."""
+    if left_out is None:
+        return
+    for reason, count in left_out.counts.items():
+        print_message(f"{name}: left out {count} {reason} (the first: {left_out.first[reason]}); --strict refuses them")
+    for note in left_out.notes:
+        print_message(f"{name}: {note}")
 
-    Raises:
-        NoPoseError: nobody was found.
+
+def refusal_words(refusal: str) -> str:
+    """The tracker's `refusal` without the numbers of its evidence, which differ in every frame."""
+    return "it never was sure enough that it is one" if refusal.startswith("log odds") else refusal
+
+
+def nobody_words(frames: int, *, stature: float | None, doubted: bool, drawn: bool) -> str:
+    """What is said where nobody was found: what was seen, and what to do.
+
+    Args:
+        frames: how many were searched.
+        stature: of somebody whom the detector sees, wherever the cameras are [m].
+        doubted: something was said to be unlikely.
+        drawn: there are pictures of what was seen, or there is nothing to draw on.
     """
-    from voodoo.recordings.first_images import depths_of, first_images
-
-    if left_out is not None:
-        for reason, count in left_out.counts.items():
-            first = left_out.first[reason]
-            print_message(f"{source.name}: left out {count} {reason} (the first: {first}); --strict refuses them")
-        for note in left_out.notes:
-            print_message(f"{source.name}: {note}")
-    if not {"tracking", "degraded"} & spool.states.keys():
-        depth = depths_of(first_images(source)[0])
-        if depth is not None and depth.warning:
-            print_message(f"{source.name}: {depth.warning}")
-    if not spool.found:
-        if refusals:
-            words = refusals.most_common(1)[0][0]
-            print_message(f"{source.name}: somebody was detected in {refusals.total()} frames and not tracked: {words}")
-        raise NoPoseError(
-            f"{source.name}: nobody was found in {spool.frames} frames; voodoo info doubts what is unlikely"
-        )
+    words = f"nobody was found in {frames} frames"
+    if stature is not None:
+        unit = "are the unit of depth and the pose of the camera right?"
+        return f"{words}, though depth shows somebody {stature:.2f} m tall: {unit}"
+    if doubted:
+        return f"{words}; what is doubted above may be the cause"
+    return words if drawn else f"{words}; --overlay look.mp4 shows what the cameras see"
 
 
 STATUS_PAGE = "docs/how-to/read-the-status.md"

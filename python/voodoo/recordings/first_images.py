@@ -1,9 +1,10 @@
-"""The first images of a recording: as they are in the file, the range of their depths, which reveals a wrong unit before it
-causes a lost body, and what its summary does not show."""
+"""The first frames of a recording: their images as they are in the file, and what reveals a wrong unit or calibration before
+it causes a lost or wrong body."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from contextlib import nullcontext
 from dataclasses import dataclass
 from itertools import islice
 
@@ -13,12 +14,15 @@ from voodoo.errors import VoodooError
 from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.recording import Recording, RecordingInfo
+from voodoo.recordings.time_units import interval_words
 from voodoo.recordings.truth import STILL_FRAMES
 
 _FRAMES = 10
 """Frames in which the first images are looked for."""
 _LEAST_DEG, _MOST_DEG = 30.0, 150.0
 """Fields of view that depth cameras have."""
+_SQUARE = 0.1
+"""Focal lengths of a depth camera that differ by a larger fraction are not of one image: its pixels are square."""
 _NEAR_M, _FAR_M = 1.2, 8.0
 """Plausible depths of a camera that observes a person: some are beyond the first limit, and the median is below the second."""
 FIXED_FRAMES = (*STILL_FRAMES, "world")
@@ -59,6 +63,7 @@ class FirstImage:
         bits: of a value, e.g. "16-bit unsigned".
         meters_per_unit: scale of depth; None for color.
         field_of_view: horizontal and vertical [deg], by the calibration.
+        focal_lengths: horizontal and vertical [px].
         depths: their range; None for color, and where nothing returned.
     """
 
@@ -68,6 +73,7 @@ class FirstImage:
     bits: str
     meters_per_unit: float | None
     field_of_view: tuple[float, float]
+    focal_lengths: tuple[float, float]
     depths: DepthRange | None = None
 
     def __str__(self) -> str:
@@ -80,17 +86,46 @@ class FirstImage:
         )
 
 
-def first_images(recording: Recording) -> tuple[list[FirstImage], str]:
-    """The first image of every camera, and why reading ended early ("": it did not)."""
-    found: dict[str, FirstImage] = {}
-    try:
-        for recorded in islice(recording, _FRAMES):
-            for item in recorded.measurements:
-                if isinstance(item, DepthImage | ColorImage) and item.sensor not in found:
-                    found[item.sensor] = _of(item)
-    except VoodooError as error:
-        return list(found.values()), str(error)
-    return list(found.values()), ""
+@dataclass(frozen=True)
+class FirstFrames:
+    """What the first frames of a recording are like.
+
+    Args:
+        images: the first one of every camera.
+        interval: usual time between frames [s]; NaN with less than two.
+        damage: why reading ended early; "" if it did not.
+    """
+
+    images: tuple[FirstImage, ...] = ()
+    interval: float = math.nan
+    damage: str = ""
+
+    @property
+    def depths(self) -> DepthRange | None:
+        """The range of the first image with depths."""
+        return next((image.depths for image in self.images if image.depths is not None), None)
+
+
+def first_frames(recording: Recording, *, left_out: LeftOut | None = None) -> FirstFrames:
+    """Read the first frames of a recording.
+
+    Args:
+        recording: is read from its start.
+        left_out: that of the recording, which does not count what is read here; None: it counts.
+    """
+    images: dict[str, FirstImage] = {}
+    stamps, damage = [], ""
+    with nullcontext() if left_out is None else left_out.aside():
+        try:
+            for recorded in islice(recording, _FRAMES):
+                stamps.append(recorded.stamp)
+                for item in recorded.measurements:
+                    if isinstance(item, DepthImage | ColorImage) and item.sensor not in images:
+                        images[item.sensor] = _of(item)
+        except VoodooError as error:
+            damage = str(error)
+    interval = float(np.median(np.diff(stamps))) if len(stamps) > 1 else math.nan
+    return FirstFrames(tuple(images.values()), interval, damage)
 
 
 def _of(item: DepthImage | ColorImage) -> FirstImage:
@@ -105,6 +140,7 @@ def _of(item: DepthImage | ColorImage) -> FirstImage:
         bits=f"{8 * image.dtype.itemsize}-bit {kind}",
         meters_per_unit=item.meters_per_unit if isinstance(item, DepthImage) else None,
         field_of_view=(next(angles), next(angles)),
+        focal_lengths=(camera.fx, camera.fy),
         depths=_range_of(item.meters()) if isinstance(item, DepthImage) else None,
     )
 
@@ -114,20 +150,29 @@ def _range_of(meters: FloatArray) -> DepthRange | None:
     return DepthRange(*np.percentile(known, (5.0, 50.0, 95.0)).tolist()) if known.size else None
 
 
-def depths_of(images: Sequence[FirstImage]) -> DepthRange | None:
-    """The range of the first image with depths."""
-    return next((image.depths for image in images if image.depths is not None), None)
+def _lens_words(image: FirstImage) -> str:
+    """What is unlikely in the calibration of a depth camera; "" if nothing."""
+    (across, down), (fx, fy) = image.field_of_view, image.focal_lengths
+    if not _LEAST_DEG < across < _MOST_DEG:
+        what = f"sees {across:.0f} x {down:.0f} deg by its calibration, and depth cameras 40 to 120"
+    elif abs(fx - fy) > _SQUARE * max(fx, fy):
+        what = f"has focal lengths of {fx:.0f} and {fy:.0f} px by its calibration, and those of depth cameras are nearly equal"
+    else:
+        return ""
+    return f"{image.sensor} {what}: are its focal lengths right?"
 
 
-def warnings(about: RecordingInfo, left_out: LeftOut, images: Sequence[FirstImage] = ()) -> list[str]:
-    """What is not right with a recording, after its first images were read."""
+def doubts(first: FirstFrames) -> list[str]:
+    """What is unlikely in times and calibration: it gives wrong speeds, or a wrong person."""
+    found = [interval_words(first.interval)]
+    found += [_lens_words(image) for image in first.images if image.meters_per_unit is not None]
+    return [words for words in found if words]
+
+
+def warnings(about: RecordingInfo, left_out: LeftOut) -> list[str]:
+    """What is not right with a recording, after its first frames were read."""
     found = [f"left out {count} {reason}: {left_out.first[reason]}" for reason, count in left_out.counts.items()]
     found += left_out.notes
-    for image in images:
-        across, down = image.field_of_view
-        if image.meters_per_unit is not None and not _LEAST_DEG < across < _MOST_DEG:
-            words = f"{image.sensor} sees {across:.0f} x {down:.0f} deg by its calibration, and depth cameras 40 to 120"
-            found.append(f"{words}: are its focal lengths right?")
     if about.duration < 0.0:
         found.append(
             f"its time goes backwards: the last frame is {-about.duration:.3f} s before the first; voodoo track "

@@ -20,14 +20,13 @@ from voodoo.recordings.order import numbers_of
 from voodoo.recordings.pictures import decode_color, decode_depth_png
 from voodoo.recordings.recording import Recording, SensorInfo, number_option, usable
 from voodoo.recordings.set_back import SetBack, out_of_order
+from voodoo.recordings.time_units import step_words, unit_of
 from voodoo.recordings.together import in_turn
 from voodoo.recordings.truth import read_beside
 from voodoo.stored import read_stored, read_stored_text
 
 _MOST_NUMBERED = 1_000_000
 """Larger integers are times in seconds, not image numbers: the limit is nine hours of images."""
-_CLOCKS = {13: 1e-3, 16: 1e-6, 19: 1e-9}
-"""Number of digits of a time since 1970 -> its unit in seconds."""
 DEPTH_SUFFIXES = (".png", ".pgm")
 
 
@@ -64,12 +63,13 @@ class FolderRecording(Recording):
         width = 640
         ...
 
-    Numbered images have the rate `rate`; names of 13, 16 or 19 digits are stamps in milli-, micro- or nanoseconds.
+    Numbered images have the rate `rate`; stamps of 13, 16 or 19 digits are in milli-, micro- or nanoseconds.
 
     Args:
         path: the folder.
         calibration: another calibration file.
         rate: images per second if they are numbered; None: 30 is assumed, and reported.
+        seconds_per_unit: unit of the stamps, also of numbers, e.g. 0.001; None: as above.
         bare: read neither truth.csv nor init.json.
         left_out: counts unusable images, which are then left out; None: they are errors.
 
@@ -85,6 +85,7 @@ class FolderRecording(Recording):
         *,
         calibration: str | Path | None = None,
         rate: float | None = None,
+        seconds_per_unit: float | None = None,
         bare: bool = False,
         left_out: LeftOut | None = None,
     ) -> None:
@@ -96,7 +97,8 @@ class FolderRecording(Recording):
         self._left_out = left_out
         self.numbers: dict[tuple[str, float], int] = {}
         rate = None if rate is None else number_option(path, "rate", rate)
-        clock = FrameClock(rate)
+        unit = None if seconds_per_unit is None else number_option(path, "seconds_per_unit", seconds_per_unit)
+        clock = FrameClock(rate, unit)
         set_back = SetBack()
         self._depth = _listing(path, "depth", DEPTH_SUFFIXES, clock, left_out, set_back)
         if not self._depth:
@@ -140,19 +142,29 @@ class FolderRecording(Recording):
 
 
 class FrameClock:
-    """Stamps from the names of files.
+    """Stamps from the names of files and the lines of lists.
 
     Args:
         rate: images per second of numbered images; None: 30.
+        unit: what stamps and numbers count [s]; None: told by their digits.
 
     Attributes:
         notes: assumptions that were made.
     """
 
-    def __init__(self, rate: float | None) -> None:
+    def __init__(self, rate: float | None, unit: float | None = None) -> None:
         """Start without assumptions."""
-        self._rate = rate
+        self._rate, self._unit = rate, unit
         self.notes: list[str] = []
+
+    def seconds(self, texts: Sequence[str], where: Sequence[object]) -> list[float]:
+        """Stamps [s] that are written in these words, each found somewhere.
+
+        Raises:
+            RecordingError: one that is not a number.
+        """
+        unit = self._unit or unit_of(texts)
+        return [_stamp(text, str(place), unit) for text, place in zip(texts, where, strict=True)]
 
     def of(self, files: Sequence[Path]) -> list[float]:
         """Stamps [s] of the names of a folder's files.
@@ -167,16 +179,18 @@ class FrameClock:
                 stems = [words[0] for words in found]
             elif (last := numbers_of(files)) is not None:
                 stems = [f"{number:09d}" for number in last]
-        numbers = [_stamp(stem, str(file)) for stem, file in zip(stems, files, strict=True)]
-        digits = {len(stem) for stem in stems} if all(stem.isdigit() for stem in stems) else set()
-        scale = next((scale for count, scale in _CLOCKS.items() if digits == {count}), None)
-        if scale is not None:
-            return [number * scale for number in numbers]
-        if not digits or max(numbers) > _MOST_NUMBERED:
-            return numbers
+        stamps = self.seconds(stems, files)
+        numbered = all(stem.isdigit() for stem in stems) and unit_of(stems) == 1.0 and max(stamps) <= _MOST_NUMBERED
+        return self._at_rate(files[0].parent.name, stamps) if numbered and self._unit is None else stamps
+
+    def _at_rate(self, folder: str, numbers: Sequence[float]) -> list[float]:
+        """Stamps [s] of numbered images; says what is assumed."""
         rate = self._rate or ASSUMED_RATE_HZ
-        message = f"{files[0].parent.name}/ is numbered, and taken for {rate:g} images/s"
-        self.notes += [message if self._rate else f"{message}; --option rate=N says another rate"]
+        words = [f"{folder}/ is numbered, and taken for {rate:g} images/s"]
+        if self._rate is None:
+            step = float(np.median(np.diff(np.sort(numbers)))) if len(numbers) > 1 else math.nan
+            words += ["--option rate=N says another rate", step_words(step, rate)]
+        self.notes.append("; ".join(filter(None, words)))
         return [number / rate for number in numbers]
 
 
@@ -194,15 +208,9 @@ def _listing(
     table = path / f"{name}.txt"
     entries: list[tuple[float, Path]] = []
     if table.is_file():
-        lines = read_stored_text(table, "a list of images").splitlines()
-        for number, line in enumerate(lines, start=1):
-            words = line.split("#", 1)[0].split()
-            if not words:
-                continue
-            if len(words) != 2:
-                raise RecordingError(f"{table}, line {number}: expected 'stamp file', found {line!r}")
-            where = f"{table}, line {number}"
-            entries.append((_stamp(words[0], where), path / _inside(words[1], where)))
+        lines = list(_lines(table))
+        stamps = clock.seconds([stamp for stamp, _, _ in lines], [where for _, _, where in lines])
+        entries = [(stamp, path / file) for stamp, (_, file, _) in zip(stamps, lines, strict=True)]
     elif (path / name).is_dir() or name == "depth":
         files = depth_files(path) if not (path / name).is_dir() else list((path / name).iterdir())
         files = [file for file in files if file.suffix.lower() in suffixes]
@@ -218,6 +226,16 @@ def _listing(
     return rising
 
 
+def _lines(table: Path) -> Iterator[tuple[str, str, str]]:
+    """Stamp and file of each line of a list of images, and where they are."""
+    for number, line in enumerate(read_stored_text(table, "a list of images").splitlines(), start=1):
+        where, words = f"{table}, line {number}", line.split("#", 1)[0].split()
+        if words and len(words) != 2:
+            raise RecordingError(f"{where}: expected 'stamp file', found {line!r}")
+        if words:
+            yield words[0], _inside(words[1], where), where
+
+
 def _inside(name: str, where: str) -> str:
     """The name of a file in the folder.
 
@@ -229,13 +247,13 @@ def _inside(name: str, where: str) -> str:
     return name
 
 
-def _stamp(text: str, where: str) -> float:
+def _stamp(text: str, where: str, unit: float) -> float:
     try:
-        stamp = float(text)
+        stamp = float(text) * unit
     except ValueError:
         stamp = math.nan
     if not math.isfinite(stamp):
-        raise RecordingError(f"{where}: expected a stamp in seconds, found {text!r}")
+        raise RecordingError(f"{where}: expected a stamp, found {text!r}")
     return stamp
 
 

@@ -288,6 +288,7 @@ def usable(
 _NUMBERS = {
     "rate": ("images per second > 0", False, 1e4), "meters_per_unit": ("a length > 0", False, 1e3),
     "tf_max_age": ("seconds >= 0", True, math.inf), "unpacked_gb": ("gigabytes > 0", False, 1e6),
+    "seconds_per_unit": ("seconds > 0", False, 1e3),
 }  # fmt: skip
 """Options of loaders that are numbers: what is expected, whether it may be zero, and the greatest one."""
 

@@ -192,6 +192,7 @@ class VideosRecording(Recording):
     Args:
         path: the folder.
         rate: images per second; None: the rate of each video, 30 for numbered images.
+        seconds_per_unit: unit of the stamps by which images are named, see FolderRecording.
         meters_per_unit: of the calibration's translations.
         color_topic: names of the cameras to use (`voodoo track --topic color=NAME`); None: all with images.
         background: folder of images of the empty scene, instead of `background/` in the folder or its parent.
@@ -210,6 +211,7 @@ class VideosRecording(Recording):
         path: Path,
         *,
         rate: float | None = None,
+        seconds_per_unit: float | None = None,
         meters_per_unit: float = 1.0,
         color_topic: str | Sequence[str] | None = None,
         background: str | Path | None = None,
@@ -220,6 +222,7 @@ class VideosRecording(Recording):
         self.path, self.name, self.root_frame = path, path.resolve().name, FRAME
         self._left_out = left_out
         rate = None if rate is None else number_option(path, "rate", rate)
+        unit = None if seconds_per_unit is None else number_option(path, "seconds_per_unit", seconds_per_unit)
         sources = picture_sources(path)
         if not sources:
             raise RecordingError(f"{path}: expected videos in videos/, or folders of pictures in images/, found none")
@@ -227,7 +230,7 @@ class VideosRecording(Recording):
             calibration_of(path, [source.stem for source in sources]),
             meters_per_unit=number_option(path, "meters_per_unit", meters_per_unit),
         )
-        clock = FrameClock(rate)
+        clock = FrameClock(rate, unit)
         self._cameras: list[Pictures] = []
         for camera, source in cameras_of(path, placed, sources, ("a video", "color_topic"), color_topic):
             sensor = source.relative_to(path).as_posix()

@@ -12,6 +12,7 @@ from voodoo.live.clock import Clock
 from voodoo.live.source import Arrival, Faults, Source, SourceEnded, kind_of
 from voodoo.measurements import FloatArray, RecordedFrame
 from voodoo.pipeline.pairing import paired
+from voodoo.recordings.first_images import doubts, first_frames
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.adapters import adapter_of
@@ -43,6 +44,7 @@ class PlayedSource(Source):
     def open(self, clock: Clock, faults: Faults) -> None:
         """See Source."""
         self._clock, self._faults = clock, faults
+        self._doubts = doubts(first_frames(self.recording, left_out=self._left_out))
         self._frames: Iterator[RecordedFrame] = iter(paired(self.recording))
         self._next = self._following()
         self._first = 0.0 if self._next is None else self._next.stamp
@@ -79,7 +81,8 @@ class PlayedSource(Source):
             kind = kind_of(reason, "unreadable message")
             self._faults.add(kind, self._left_out.first[reason], self._clock.now(), count)
         self._left_out.counts.clear()
-        for words in (*self.recording.assumed, *(f"{self.name}: {note}" for note in self._left_out.notes)):
+        own = (f"{self.name}: {words}" for words in (*self._doubts, *self._left_out.notes))
+        for words in (*self.recording.assumed, *own):
             if words not in self._told:
                 self._told.add(words)
                 self._faults.log(words)
