@@ -14,7 +14,6 @@ import pytest
 import voodoo
 from scene import rest_pose, standing_joints, surface
 from voodoo import BodyError, ConfigError, MeasurementError, VoodooError
-from voodoo.errors import UnitWarning
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +61,7 @@ def test_depth_of_a_wrong_unit_warns_once_for_each_sensor():
         ("integers", MILLIMETERS, {"meters_per_unit": 1.0}),
         ("without a unit", METERS, {}),
     ]
-    assert warned_of(*wrong) == [(UnitWarning, source, __file__) for source, _, _ in wrong]
+    assert warned_of(*wrong) == [(voodoo.UnitWarning, source, __file__) for source, _, _ in wrong]
     near, far = METERS / 50.0, METERS * 30.0
     right = [
         ("a", METERS, {"meters_per_unit": 1.0}),

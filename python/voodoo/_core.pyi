@@ -532,7 +532,7 @@ class Frame:
             MeasurementError: wrong shape or dtype, no calibration, or no rigid transform.
 
         Warns:
-            UnitWarning: the median depth is below 1 cm or beyond 100 m, so that `meters_per_unit` is wrong.
+            voodoo.UnitWarning: the median depth is below 1 cm or beyond 100 m, so that `meters_per_unit` is wrong.
         """
     def add_color(
         self,
