@@ -13,9 +13,9 @@ from voodoo.errors import BodyError as BodyError
 from voodoo.errors import CameraError as CameraError
 from voodoo.errors import ConfigError as ConfigError
 from voodoo.errors import DetectorWarning as DetectorWarning
-from voodoo.errors import UnitWarning as UnitWarning
 from voodoo.errors import MeasurementError as MeasurementError
 from voodoo.errors import RecordingError as RecordingError
+from voodoo.errors import UnitWarning as UnitWarning
 from voodoo.errors import VoodooError as VoodooError
 from voodoo.model.body import Body as Body
 from voodoo.model.body import Joint as Joint
