@@ -2,10 +2,8 @@
 
 from collections import Counter
 
-import voodoo
 from commands import run
-from scene import standing_joints
-from voodoo.cli.track import closing_remarks, nobody_words, refusal_words
+from voodoo.cli.track import closing_remarks, nobody_words
 from voodoo.recordings import sample_path
 
 
@@ -41,12 +39,3 @@ def test_where_nobody_is_found_the_last_line_says_what_was_seen_and_what_to_do()
     assert nobody_words(9, **told | {"drawn": True}) == "nobody was found in 9 frames"
     assert "what is doubted above" in nobody_words(9, **told | {"doubted": True})
     assert "depth shows somebody 0.83 m tall: are the unit of depth" in nobody_words(9, **told | {"stature": 0.834})
-
-
-def test_a_refusal_is_told_without_odds():
-    people = voodoo.People(detector=None)
-    frame = voodoo.Frame(0.0)
-    frame.add_detection(standing_joints(voodoo.Body.human(1.75)), log_odds=2.5)
-    people.step(frame)
-    assert "log odds" in people.refusal and refusal_words(people.refusal).endswith("sure enough that it is one")
-    assert refusal_words("a body that fits nothing") == "a body that fits nothing"

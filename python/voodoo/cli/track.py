@@ -173,7 +173,8 @@ def track_command(
         refusals: Counter[str] = Counter()
 
         def take(step: TrackedFrame[Any]) -> None:
-            refusals.update([refusal_words(tracker.refusal)] if tracker.refusal else [])
+            # What follows a colon are numbers, which differ in every frame.
+            refusals.update([tracker.refusal.partition(":")[0]] if tracker.refusal else [])
             spool.add(step.estimate, step.front_end.bodies)
 
         with deferred():
@@ -233,11 +234,6 @@ def _print_left_out(name: str, left_out: LeftOut | None) -> None:
         print_message(f"{name}: left out {count} {reason} (the first: {left_out.first[reason]}); --strict refuses them")
     for note in left_out.notes:
         print_message(f"{name}: {note}")
-
-
-def refusal_words(refusal: str) -> str:
-    """The tracker's `refusal` without the numbers of its evidence, which differ in every frame."""
-    return "it never was sure enough that it is one" if refusal.startswith("log odds") else refusal
 
 
 def nobody_words(frames: int, *, stature: float | None, doubted: bool, drawn: bool) -> str:
