@@ -24,7 +24,7 @@ pub(super) struct Extremity<'a> {
 
 impl<'a> Extremity<'a> {
     pub(super) fn new(context: Context<'a>, fit: &'a Fit, poses: &'a [Pose], chain: &'a TwoBone) -> Self {
-        Self { objective: Objective::new(context, fit, poses, 1.0), chain }
+        Self { objective: Objective::new(context, fit, poses), chain }
     }
 
     /// Center of its ball joint, working frame.
