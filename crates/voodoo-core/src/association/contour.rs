@@ -4,9 +4,10 @@ use crate::association::correspondence::EdgePair;
 use crate::body::{Body, Limb};
 use crate::math::{Points, Pose, Vec3, refill, smooth_step, vectorized};
 use crate::observation::depth_view::{DepthView, Pixel};
+use crate::visibility::along_limb;
 
 /// Where along a limb its contour is searched for, as fractions of its length; the ends also belong to the neighbors.
-const STATIONS: [f64; 5] = [0.2, 0.35, 0.5, 0.65, 0.8];
+const STATIONS: [f64; 5] = along_limb(0.2);
 /// A return that differs in depth from the limb's axis by more than this plus the limb's half thickness is another object,
 /// meters.
 const DEPTH_REACH: f64 = 0.12;

@@ -30,8 +30,9 @@ const PRIOR_LEVER: f64 = 0.1;
 
 /// Landmarks that are at least this fraction of a limb's length apart along its axis determine its length.
 const SPREAD_ALONG: f64 = 0.3;
-/// Maximum factor by which a limb is stretched or shrunk. A larger factor indicates another person or a wrong landmark.
-const MOST_STRETCH: f64 = 2.0;
+/// Maximum factor by which a limb is stretched or shrunk, by landmarks or by all frames together. A larger factor indicates another
+/// person or a wrong landmark.
+pub(crate) const MOST_STRETCH: f64 = 2.0;
 /// Points are collinear when the sum of pairwise products of their scatter's eigenvalues is below this fraction of its squared
 /// trace: their width is then a hundredth of their length.
 const ON_A_LINE: f64 = 1e-4;

@@ -12,6 +12,7 @@ pub(crate) mod shoulders;
 pub(crate) mod two_bone;
 
 pub(crate) use edit::Pair;
+pub(crate) use fit::MOST_STRETCH;
 pub use human::HumanModel;
 pub use joint::{Joint, JointKind};
 pub(crate) use model::Model;

@@ -15,10 +15,10 @@ use crate::math::{Pose, Vec3, extrapolated, refill, shifted};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::picture::ColorImage;
 use crate::shape::TaperedEllipticCylinder;
-use crate::visibility::ALONG_LIMB;
+use crate::visibility::{ALONG_LIMB, across_limb};
 
 /// Sample positions across a limb, as fractions of its projected radius.
-const OVER: [f64; 5] = [-0.7, -0.35, 0.0, 0.35, 0.7];
+const OVER: [f64; 5] = across_limb(0.7);
 /// Backdrops are drawn in cells of two to this power pixels.
 const BACKDROP_BITS: u32 = 2;
 
