@@ -41,7 +41,7 @@ pub(crate) fn stand(body: &Body) -> Vec<Pose> {
 pub(crate) fn depth(body: &Body, poses: &[Pose]) -> Vec<u16> {
     let mut rendering = Rendering::default();
     let view = Viewpoint { camera: &CAMERA, world_from_sensor: Pose::IDENTITY };
-    rendering.render(body, poses, &view, None).unwrap();
+    rendering.render(body, poses, &view).unwrap();
     rendering.depth().iter().map(|depth| (depth * 1000.0) as u16).collect()
 }
 

@@ -25,7 +25,7 @@ pub(crate) fn standing() -> (Body, Vec<Pose>) {
 pub(crate) fn before_wall(body: &Body, poses: &[Pose]) -> Vec<u16> {
     let mut rendering = Rendering::default();
     let view = Viewpoint { camera: &CAMERA, world_from_sensor: Pose::IDENTITY };
-    rendering.render(body, poses, &view, None).unwrap();
+    rendering.render(body, poses, &view).unwrap();
     rendering.depth().iter().map(|depth| if *depth > 0.0 { (depth * 1000.0) as u16 } else { WALL }).collect()
 }
 

@@ -111,7 +111,7 @@ pub(crate) struct Posed<'a> {
 /// let rotation = Quat::from_mat3(&Mat3::from_cols(Vec3::Y, -Vec3::Z, -Vec3::X));
 /// let world_from_sensor = Pose::from_parts(Vec3::X * 3.0, rotation);
 /// let mut rendering = Rendering::default();
-/// rendering.render(&body, &standing, &Viewpoint { camera: &camera, world_from_sensor }, None)?;
+/// rendering.render(&body, &standing, &Viewpoint { camera: &camera, world_from_sensor })?;
 /// let red_on_gray: Vec<[u8; 3]> =
 ///     rendering.limb().iter().map(|limb| if *limb == NO_LIMB { [90; 3] } else { [200, 30, 30] }).collect();
 ///
