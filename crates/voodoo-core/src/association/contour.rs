@@ -196,7 +196,7 @@ impl Contours {
         for view in views {
             for (limb, (part, pose)) in body.limbs().iter().zip(poses).enumerate() {
                 edges(&view, part, pose, |edge| {
-                    self.places.push(edge.place.to_array().map(|value| value as f32));
+                    self.places.push(edge.place.as_vec3().to_array());
                     let target = *pose * (edge.foot + edge.side * (edge.reach - edge.rim));
                     let (source, own, others) = (view.image.source, f32::INFINITY, f32::INFINITY);
                     self.edges.push(LimbEdge { limb, edge, target, source, own, others });

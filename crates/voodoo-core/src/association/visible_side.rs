@@ -69,7 +69,7 @@ fn facing_away(matches: &LimbMatches, range: Range<usize>, [x, y, z]: [f32; 3]) 
 /// The other end of the chord through a slice, from a surface point along the line of sight (limb frame), and the normal there.
 /// In units of the semi-axes the slice is a circle, and the ends of the chord are mirror images.
 fn near_side(shape: &TaperedEllipticCylinder, point: Vec3, view: Vec3) -> (Vec3, Vec3) {
-    let rates = [(shape.a1() - shape.a0()) / shape.length(), (shape.b1() - shape.b0()) / shape.length()];
+    let rates = shape.growth();
     let (a, b) = (shape.a0() + rates[0] * point.z, shape.b0() + rates[1] * point.z);
     let (a, b) = (a.max(MIN_SIZE), b.max(MIN_SIZE));
     let (x, y) = (point.x / a, point.y / b);

@@ -68,14 +68,14 @@ impl RoughSearch {
         for limb in at.chain.limbs() {
             let matches = &at.objective.correspondences.limbs[limb];
             for index in (0..matches.weight.len()).filter(|index| matches.weight[*index] > 0.0) {
-                let point = matches.measured.get(index).to_array().map(|value| value as f32);
+                let point = matches.measured.get(index).as_vec3().to_array();
                 sample.push(point, matches.area(index, candidates));
             }
         }
         sample.subsample(ROUGH_SAMPLE);
         reset(others, sample.weights.len(), f32::INFINITY);
         let (body, poses) = (&at.objective.context.model.body, at.objective.poses);
-        for limb in (0..poses.len()).filter(|limb| at.chain.limbs().all(|own| own != *limb)) {
+        for limb in (0..poses.len()).filter(|limb| !at.chain.has(*limb)) {
             explain(body, limb, poses, &sample.points, others, distances);
         }
     }

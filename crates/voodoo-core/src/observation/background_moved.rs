@@ -94,7 +94,7 @@ impl Background {
 }
 
 /// Stands for the ray through the pixel center.
-pub(super) const NO_RAY: [f32; 2] = [f32::INFINITY; 2];
+const NO_RAY: [f32; 2] = [f32::INFINITY; 2];
 
 #[cfg(test)]
 mod tests {

@@ -80,7 +80,7 @@ impl ColorRegions {
     /// Writes to `supports` what every limb of the arms and legs explains that no limb outside its own arm or leg does.
     pub(crate) fn pixel_gains(&mut self, posed: Posed, chains: &[TwoBone], supports: &mut [RegionSupport]) {
         for chain in chains {
-            self.draw(posed, |limb| chain.limbs().all(|own| own != limb));
+            self.draw(posed, |limb| !chain.has(limb));
             for limb in chain.limbs() {
                 [supports[limb].gained, supports[limb].area] = self.pixel_gain(posed, limb);
             }

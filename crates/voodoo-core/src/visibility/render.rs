@@ -281,7 +281,7 @@ impl LimbRaycaster {
         let d = self.axes[0] * x + self.axes[1] * y + self.axes[2];
         let length = self.shape.length();
         let (a0, b0) = (self.shape.a0(), self.shape.b0());
-        let (da, db) = ((self.shape.a1() - a0) / length, (self.shape.b1() - b0) / length);
+        let [da, db] = self.shape.growth();
         let inside = |z: f64| select(z < 0.0, 0.0, select(z > length, length, z));
         // Intersections with the planes of the caps.
         let (one, other) = (-o.z / d.z, (length - o.z) / d.z);
