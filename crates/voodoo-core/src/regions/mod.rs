@@ -27,6 +27,7 @@ use histogram::ColorModel;
 use labels::LimbLabels;
 use lines::{Line, SAME_VIEW, Viewer};
 use pixel_gain::camera_from_limb_at;
+use posterior::MOST_REACH;
 use scan::{EdgeSearch, ScanView};
 use std::collections::BTreeMap;
 
@@ -37,8 +38,8 @@ const SEARCHES: [EdgeSearch; STEPS] = [
     EdgeSearch { reach: 6, every: 1.0 },
     EdgeSearch { reach: 5, every: 1.0 },
 ];
-/// The edge search for estimating a limb's girth.
-const SINGLE_EDGES: EdgeSearch = EdgeSearch { reach: 10, every: 1.0 };
+/// The edge search for estimating a limb's girth: as wide as one can be.
+const SINGLE_EDGES: EdgeSearch = EdgeSearch { reach: MOST_REACH, every: 1.0 };
 /// Label images are drawn in cells of two to this power pixels.
 const CELL_BITS: u32 = 1;
 /// Approximate spacing of lines along a limb, meters; and the least and greatest number of lines on each side.
