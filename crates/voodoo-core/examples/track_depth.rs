@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for index in 0..30 {
         // The person walks sideways at 0.3 m/s.
         let truth = standing(&body, 0.01 * f64::from(index));
-        rendering.render(&body, &truth, &Viewpoint { camera: &camera, world_from_sensor }, None)?;
+        rendering.render(&body, &truth, &Viewpoint { camera: &camera, world_from_sensor })?;
         let image = DepthImage {
             pixels: DepthPixels::F32(rendering.depth()),
             camera: &camera,

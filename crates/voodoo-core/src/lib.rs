@@ -190,6 +190,7 @@ pub use camera::{Camera, Lens};
 pub use config::{Config, Field, Overlap, SolverKind};
 pub use detect::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 pub use error::{BodyError, TrackError, Unexpected};
+pub use observation::background::SURFACE_STEP;
 pub use observation::frame::{
     Cloud, DepthImage, DepthPixels, DetectedPerson, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope,
 };

@@ -1,7 +1,5 @@
-//! What unit tests of the tracker's parts share: a synthetic depth camera, and a part's view of one frame.
+//! What unit tests of the tracker's parts share: a part's view of one frame of a synthetic depth camera.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
-
-use std::sync::LazyLock;
 
 use crate::body::{Body, HumanModel, Model};
 use crate::camera::Camera;
@@ -14,13 +12,12 @@ use crate::observation::depth_view::DepthViews;
 use crate::observation::frame::{DepthImage, DepthPixels, Frame};
 use crate::observation::observer::Observer;
 use crate::observation::ownership::OwnershipMask;
-use crate::visibility::render::{Rendering, Viewpoint};
 
-/// The camera, which stands in the world's origin and looks along z.
-static CAMERA: LazyLock<Camera> = LazyLock::new(|| Camera::pinhole(160, 124, [145.0, 145.0, 79.5, 61.5]).unwrap());
+#[path = "../tests/before_camera/mod.rs"]
+mod before_camera;
 
-/// Depth of the wall behind the body, millimeters.
-const WALL: u16 = 4500;
+use before_camera::{WALL, millimeters};
+pub(crate) use before_camera::{before_wall, depth, put_board, stand};
 
 /// A human who stands 2.6 m before the camera and faces it.
 pub(crate) fn standing() -> (Model, Vec<Pose>) {
@@ -29,48 +26,9 @@ pub(crate) fn standing() -> (Model, Vec<Pose>) {
     (Model::new(body), poses)
 }
 
-/// Any body as it stands there.
-pub(crate) fn stand(body: &Body) -> Vec<Pose> {
-    // The body's x looks forward and z up; the camera's y points down.
-    let upright = Quat::from_axis_angle(Vec3::X, std::f64::consts::FRAC_PI_2);
-    let faces = Quat::from_axis_angle(Vec3::Z, -std::f64::consts::FRAC_PI_2);
-    body.rest_pose(Pose::from_parts(Vec3::new(0.0, 0.1, 2.6), upright * faces))
-}
-
-/// Depth in millimeters, as the camera sees a posed body before nothing.
-pub(crate) fn depth(body: &Body, poses: &[Pose]) -> Vec<u16> {
-    let mut rendering = Rendering::default();
-    let view = Viewpoint { camera: &CAMERA, world_from_sensor: Pose::IDENTITY };
-    rendering.render(body, poses, &view, None).unwrap();
-    rendering.depth().iter().map(|depth| (depth * 1000.0) as u16).collect()
-}
-
-/// The same before a wall.
-pub(crate) fn before_wall(body: &Body, poses: &[Pose]) -> Vec<u16> {
-    depth(body, poses).into_iter().map(|depth| if depth == 0 { WALL } else { depth }).collect()
-}
-
-/// Puts a board that faces the camera before what an image shows; half its width and height, meters.
-pub(crate) fn put_board(pixels: &mut [u16], center: Vec3, [width, height]: [f64; 2]) {
-    for (index, pixel) in pixels.iter_mut().enumerate() {
-        let [x, y] = CAMERA.pixel_ray(index % CAMERA.width(), index / CAMERA.width()).map(|ray| center.z * ray);
-        let depth = (1000.0 * center.z) as u16;
-        if (x - center.x).abs() < width && (y - center.y).abs() < height && (*pixel == 0 || depth < *pixel) {
-            *pixel = depth;
-        }
-    }
-}
-
 /// A frame of one depth image.
 pub(crate) fn with_frame<R>(pixels: &[u16], stamp: f64, check: impl FnOnce(&Frame) -> R) -> R {
-    let images = [DepthImage {
-        pixels: DepthPixels::U16(pixels),
-        camera: &CAMERA,
-        meters_per_unit: 0.001,
-        world_from_sensor: Pose::IDENTITY,
-        weight: 1.0,
-        source: 0,
-    }];
+    let images = [millimeters(pixels)];
     check(&Frame { images: &images, ..Frame::empty(stamp) })
 }
 

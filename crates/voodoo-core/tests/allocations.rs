@@ -67,9 +67,9 @@ fn allocations_of_a_rendering() -> usize {
     };
     let poses = scene::standing(&body);
     let mut image = Rendering::default();
-    image.render(&body, &poses, &view, None).unwrap();
+    image.render(&body, &poses, &view).unwrap();
     let before = allocations_so_far();
-    image.render(&body, &poses, &view, None).unwrap();
+    image.render(&body, &poses, &view).unwrap();
     allocations_so_far() - before
 }
 

@@ -181,7 +181,7 @@ fn renderings(from: &mut Hostile, body: &Body, standing: &[Pose]) {
     let Ok(camera) = Camera::new(width, height, intrinsics, lens) else { return };
     let view = Viewpoint { camera: &camera, world_from_sensor: from.pose() };
     let mut image = Rendering::default();
-    if image.render(body, standing, &view, None).is_ok() {
+    if image.render(body, standing, &view).is_ok() {
         assert!(image.depth().iter().all(|depth| *depth >= 0.0), "{view:?}");
     }
 }

@@ -2,11 +2,10 @@
 
 use crate::view::ThinnedImage;
 use nalgebra::{Matrix3, Vector3};
+use voodoo_core::SURFACE_STEP;
 use voodoo_core::math::{Aabb, Vec3, refill, reset, widest};
 
-/// Neighboring pixels are connected when their depths differ by less than this, meters, plus this fraction of the depth.
-const STEP: [f32; 2] = [0.04, 0.012];
-/// Components that are too large for a person are split again with steps that are this fraction of the previous ones.
+/// Components that are too large for a person are split again with steps of depth that are this fraction of the previous ones.
 const CUT_FINER: f32 = 0.5;
 /// Maximum number of splits.
 const CUTS: usize = 2;
@@ -152,7 +151,7 @@ impl Components {
         self.join(view, finer);
     }
 
-    /// Connects neighbors, and pixels at a distance of two, among the pixels marked in `again`.
+    /// Connects neighbors, and pixels at a distance of two, that are on one surface, among the pixels marked in `again`.
     fn join(&mut self, view: &ThinnedImage, finer: f32) {
         self.link(view, finer);
         let width = view.width;
@@ -214,7 +213,7 @@ impl Components {
                         let (again, again_others) = (&again[from..to], &again[from - back..to - back]);
                         let pairs = own.iter().zip(others).zip(again).zip(again_others);
                         for (linked, (((z, other), again), again_other)) in linked[from..to].iter_mut().zip(pairs) {
-                            let near = (z - other).abs() < finer * (STEP[0] + STEP[1] * z.min(*other));
+                            let near = (z - other).abs() < finer * (SURFACE_STEP[0] + SURFACE_STEP[1] * z.min(*other));
                             let valid = (*z > 0.0) & (*other > 0.0);
                             *linked |= bit * (u8::from(near & valid) & again & again_other);
                         }
@@ -425,7 +424,7 @@ mod tests {
         let (depth, width) = (&view.depth, view.width);
         let connected = |a: usize, b: usize| {
             let [a, b] = [depth[a], depth[b]];
-            a > 0.0 && b > 0.0 && (a - b).abs() < STEP[0] + STEP[1] * a.min(b)
+            a > 0.0 && b > 0.0 && (a - b).abs() < SURFACE_STEP[0] + SURFACE_STEP[1] * a.min(b)
         };
         let mut expected = vec![NONE; depth.len()];
         for first in (0..depth.len()).filter(|index| depth[*index] > 0.0) {

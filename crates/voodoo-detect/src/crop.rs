@@ -9,7 +9,7 @@ pub const SIZE: usize = 96;
 /// Its width at the depth of the candidate's center, meters, where it is not enlarged.
 pub(crate) const WIDTH: f64 = 2.6;
 /// Range of depth in front of and behind the center that is resolved there, meters.
-pub(crate) const DEPTH: f64 = 1.2;
+const DEPTH: f64 = 1.2;
 /// Below this sine of the angle between up and the optical axis, up is not defined in the image.
 const LEAST_UP: f64 = 0.3;
 

@@ -24,6 +24,11 @@ const NEIGHBOR: f64 = 0.05;
 /// The plane is refitted to the points within these fractions of the trials' distance threshold.
 const NEARER: [f64; 2] = [0.7, 0.5];
 
+/// Distance within which a point is on the floor, meters.
+fn tolerance(point: Vec3) -> f64 {
+    NEAR[0] + NEAR[1] * point.z * point.z
+}
+
 /// Points with the tolerance of each point's distance from the floor.
 #[derive(Debug, Default)]
 struct PointLanes {
@@ -34,7 +39,7 @@ struct PointLanes {
 impl PointLanes {
     fn push(&mut self, point: Vec3) {
         self.points.push(point.as_vec3().to_array());
-        self.near.push((NEAR[0] + NEAR[1] * point.z * point.z) as f32);
+        self.near.push(tolerance(point) as f32);
     }
 
     /// Sums `worth` over the heights of the points above a plane, in units of the points' tolerances.
@@ -115,8 +120,7 @@ pub(crate) fn find_floor(view: &ThinnedImage, up: Vec3) -> Option<Ground> {
 
 /// Refits the plane to all nearby ones of these points on horizontal surfaces, by least squares along its normal.
 fn refined(level: &[Vec3], plane: Ground, fraction: f64) -> Ground {
-    let near = |point: &Vec3| fraction * (NEAR[0] + NEAR[1] * point.z * point.z);
-    let on = |point: &&Vec3| (plane.normal.dot(**point) - plane.offset).abs() < near(point);
+    let on = |point: &&Vec3| plane.height(**point).abs() < fraction * tolerance(**point);
     let points: Vec<&Vec3> = level.iter().filter(on).collect();
     let mean = points.iter().copied().sum::<Vec3>() / (points.len() as f64).max(1.0);
     let first = plane.normal.any_orthonormal_vector();

@@ -2,8 +2,8 @@
 
 use voodoo_core::math::{FMA, multiply_add, store, widest_fused};
 
-/// Number of columns that are processed together.
-const TOGETHER: usize = 16;
+/// Number of columns, or channels, that are processed together.
+pub(crate) const TOGETHER: usize = 16;
 /// Number of rows that are processed together: their sums fit into the registers of AVX2. The network's maps have multiples of
 /// nine pixels; the remaining rows are processed in groups of three.
 const ROWS: usize = 6;

@@ -1,53 +1,16 @@
-//! Shared by unit tests: a synthetic depth camera at the world's origin that looks along z.
+//! Shared by unit tests: a synthetic depth camera, and a human before it.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
-use std::sync::LazyLock;
-use voodoo_core::math::{Pose, Quat, Vec3};
-use voodoo_core::{Body, Camera, DepthImage, DepthPixels, HumanModel, Rendering, Viewpoint};
+#[path = "../../voodoo-core/tests/before_camera/mod.rs"]
+mod before_camera;
 
-/// The camera.
-static CAMERA: LazyLock<Camera> = LazyLock::new(|| Camera::pinhole(160, 124, [145.0, 145.0, 79.5, 61.5]).unwrap());
+pub(crate) use before_camera::{before_wall, millimeters as image, put_board};
+use voodoo_core::math::Pose;
+use voodoo_core::{Body, HumanModel};
 
-/// Depth of the wall behind the body, millimeters.
-const WALL: u16 = 4500;
-
-/// A human who stands 2.6 m in front of the camera and faces it.
+/// A human who stands there.
 pub(crate) fn standing() -> (Body, Vec<Pose>) {
     let body = Body::human(1.75, HumanModel::Full).unwrap();
-    // The body has x forward and z up; the camera has y down.
-    let upright = Quat::from_axis_angle(Vec3::X, std::f64::consts::FRAC_PI_2);
-    let faces = Quat::from_axis_angle(Vec3::Z, -std::f64::consts::FRAC_PI_2);
-    let poses = body.rest_pose(Pose::from_parts(Vec3::new(0.0, 0.1, 2.6), upright * faces));
+    let poses = before_camera::stand(&body);
     (body, poses)
-}
-
-/// Renders the depth of a posed body in front of a wall, millimeters.
-pub(crate) fn before_wall(body: &Body, poses: &[Pose]) -> Vec<u16> {
-    let mut rendering = Rendering::default();
-    let view = Viewpoint { camera: &CAMERA, world_from_sensor: Pose::IDENTITY };
-    rendering.render(body, poses, &view, None).unwrap();
-    rendering.depth().iter().map(|depth| if *depth > 0.0 { (depth * 1000.0) as u16 } else { WALL }).collect()
-}
-
-/// Renders a board that faces the camera into an image; half its width and height, meters.
-pub(crate) fn put_board(pixels: &mut [u16], center: Vec3, [width, height]: [f64; 2]) {
-    for (index, pixel) in pixels.iter_mut().enumerate() {
-        let [x, y] = CAMERA.pixel_ray(index % CAMERA.width(), index / CAMERA.width()).map(|ray| center.z * ray);
-        let depth = (1000.0 * center.z) as u16;
-        if (x - center.x).abs() < width && (y - center.y).abs() < height && (*pixel == 0 || depth < *pixel) {
-            *pixel = depth;
-        }
-    }
-}
-
-/// A depth image of the camera from these pixels.
-pub(crate) fn image(pixels: &[u16]) -> DepthImage<'_> {
-    DepthImage {
-        pixels: DepthPixels::U16(pixels),
-        camera: &CAMERA,
-        meters_per_unit: 0.001,
-        world_from_sensor: Pose::IDENTITY,
-        weight: 1.0,
-        source: 0,
-    }
 }

@@ -76,7 +76,7 @@ impl ThinnedImage {
 
     /// Removes points on the floor or below it.
     pub(crate) fn remove_floor(&mut self, floor: &Ground) {
-        let normal = floor.normal.to_array().map(|value| value as f32);
+        let normal = floor.normal.as_vec3().to_array();
         let least = (floor.offset + FLOOR_CLEARANCE) as f32;
         for (z, [x, y]) in self.depth.iter_mut().zip(&self.slopes) {
             if *z * (normal[0] * x + normal[1] * y + normal[2]) < least {

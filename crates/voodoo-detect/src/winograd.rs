@@ -4,7 +4,7 @@
 //! A 4 x 4 tile of the input map gives 2 x 2 output pixels. Both are linear transforms of tiles in which the convolution is one
 //! product for each of the 16 positions: 16 multiplications instead of 36.
 
-use crate::product::Panels;
+use crate::product::{Panels, TOGETHER};
 use voodoo_core::math::{load, store, widest};
 
 /// Edge of the kernel.
@@ -83,33 +83,30 @@ fn of_kernel([a, b, c]: [f32; KERNEL]) -> [f32; TILE] {
     [a, 0.5 * (a + b + c), 0.5 * (a - b + c), c]
 }
 
-/// Channels that are transformed together.
-const CHANNELS: usize = 16;
-
 /// Transforms all tiles of a map, with zeros around the map.
 #[inline(always)]
 fn transform_input(map: &[f32], edge: usize, channels: usize, input_tiles: &mut [f32]) {
     let across = edge / OUTPUT_TILE;
     let count = across * across;
     let (mut tile, mut half, mut whole) =
-        ([[[0.0; CHANNELS]; TILE]; TILE], [[[0.0; CHANNELS]; TILE]; TILE], [[[0.0; CHANNELS]; TILE]; TILE]);
+        ([[[0.0; TOGETHER]; TILE]; TILE], [[[0.0; TOGETHER]; TILE]; TILE], [[[0.0; TOGETHER]; TILE]; TILE]);
     for number in 0..count {
         let (top, left) = (OUTPUT_TILE * (number / across), OUTPUT_TILE * (number % across));
-        for first in (0..channels).step_by(CHANNELS) {
-            let here = CHANNELS.min(channels - first);
+        for first in (0..channels).step_by(TOGETHER) {
+            let here = TOGETHER.min(channels - first);
             for (row, line) in tile.iter_mut().enumerate() {
                 for (column, values) in line.iter_mut().enumerate() {
                     // A tile starts one pixel before its output.
                     let [y, x] = [top + row, left + column];
                     if y == 0 || x == 0 || y > edge || x > edge {
-                        *values = [0.0; CHANNELS];
+                        *values = [0.0; TOGETHER];
                     } else {
                         load(values, &map[((y - 1) * edge + x - 1) * channels + first..][..here]);
                     }
                 }
             }
             for column in 0..TILE {
-                for lane in 0..CHANNELS {
+                for lane in 0..TOGETHER {
                     let [a, b, c, d] = [0, 1, 2, 3].map(|row: usize| tile[row][column][lane]);
                     half[0][column][lane] = a - c;
                     half[1][column][lane] = b + c;
@@ -118,7 +115,7 @@ fn transform_input(map: &[f32], edge: usize, channels: usize, input_tiles: &mut 
                 }
             }
             for (half, whole) in half.iter().zip(&mut whole) {
-                for lane in 0..CHANNELS {
+                for lane in 0..TOGETHER {
                     let [a, b, c, d] = [0, 1, 2, 3].map(|column: usize| half[column][lane]);
                     whole[0][lane] = a - c;
                     whole[1][lane] = b + c;
@@ -139,23 +136,23 @@ fn transform_output(output_tiles: &[f32], edge: usize, channels: usize, out: &mu
     let across = edge / OUTPUT_TILE;
     let count = across * across;
     let (mut tile, mut half, mut whole) =
-        ([[0.0; CHANNELS]; PLACES], [[[0.0; CHANNELS]; TILE]; OUTPUT_TILE], [[0.0; CHANNELS]; OUTPUT_TILE]);
+        ([[0.0; TOGETHER]; PLACES], [[[0.0; TOGETHER]; TILE]; OUTPUT_TILE], [[0.0; TOGETHER]; OUTPUT_TILE]);
     for number in 0..count {
         let (top, left) = (OUTPUT_TILE * (number / across), OUTPUT_TILE * (number % across));
-        for first in (0..channels).step_by(CHANNELS) {
-            let here = CHANNELS.min(channels - first);
+        for first in (0..channels).step_by(TOGETHER) {
+            let here = TOGETHER.min(channels - first);
             for (place, values) in tile.iter_mut().enumerate() {
                 load(values, &output_tiles[(place * count + number) * channels + first..][..here]);
             }
             for column in 0..TILE {
-                for lane in 0..CHANNELS {
+                for lane in 0..TOGETHER {
                     let [a, b, c, d] = [0, 1, 2, 3].map(|row: usize| tile[row * TILE + column][lane]);
                     half[0][column][lane] = a + b + c;
                     half[1][column][lane] = b - c - d;
                 }
             }
             for (row, half) in half.iter().enumerate() {
-                for lane in 0..CHANNELS {
+                for lane in 0..TOGETHER {
                     let [a, b, c, d] = [0, 1, 2, 3].map(|column: usize| half[column][lane]);
                     whole[0][lane] = a + b + c;
                     whole[1][lane] = b - c - d;

@@ -2,7 +2,8 @@
 
 use super::model::{ChainModel, Kinematics};
 use super::trunk::Trunk;
-use super::view::{NEAREST, SilhouetteView};
+use super::view::SilhouetteView;
+use voodoo_core::Camera;
 use voodoo_core::math::{Mat3, Vec3};
 
 /// Samples on a projected segment, in place of the sum over its pixels in J10 eq. 5.
@@ -56,7 +57,7 @@ impl Criterion<'_> {
             let ends = segment.ends.map(|(link, point)| at.poses[link].transform_point(point));
             for view in self.views {
                 let z = view.camera_from_world.transform_point(0.5 * (ends[0] + ends[1])).z;
-                sum += view.camera.focal()[0] * (ends[1] - ends[0]).length() / z.max(NEAREST);
+                sum += view.camera.focal()[0] * (ends[1] - ends[0]).length() / z.max(Camera::NEAREST);
             }
         }
         let views = self.views.len();
@@ -132,7 +133,7 @@ impl Criterion<'_> {
                 let (slope, x) = (pose.rotation * slope, ends[0] + t * (ends[1] - ends[0]));
                 for view in self.views {
                     let z = view.camera_from_world.transform_point(x).z;
-                    if z < NEAREST {
+                    if z < Camera::NEAREST {
                         continue;
                     }
                     let scale = view.camera.focal()[0] / z;

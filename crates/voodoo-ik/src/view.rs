@@ -3,8 +3,6 @@
 use voodoo_core::Camera;
 use voodoo_core::math::{Pose, Vec3};
 
-/// Points nearer to the camera plane than this, or behind it, are ignored; meters.
-pub(super) const NEAREST: f64 = 0.05;
 /// Four neighboring depths that differ by more than this fraction do not belong to one surface.
 const EDGE: f64 = 0.03;
 /// Minimum distance of a bone behind the measured surface of its limb, in radii. It is one for a limb perpendicular to the line
@@ -36,7 +34,7 @@ impl SilhouetteView {
     /// Returns `max(distance + depth, 0)` of a point in the optical frame plus how far it lies in front of the measured depth,
     /// both in pixels, and the derivative with respect to the point.
     pub(super) fn outside(&self, x: Vec3, radius: f64, thin: f64) -> (f64, Vec3) {
-        if x.z < NEAREST {
+        if x.z < Camera::NEAREST {
             return (0.0, Vec3::ZERO);
         }
         let [fx, fy] = self.camera.focal();
@@ -83,7 +81,7 @@ impl SilhouetteView {
         let Some(corners) = at.corners(&self.depth) else { return nothing };
         let corners = corners.map(f64::from);
         let (least, most) = corners.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), d| (a.min(*d), b.max(*d)));
-        if at.beyond != [0.0; 2] || !(least > NEAREST && most < (1.0 + EDGE) * least) {
+        if at.beyond != [0.0; 2] || !(least > Camera::NEAREST && most < (1.0 + EDGE) * least) {
             return nothing;
         }
         let [observed, du, dv] = at.interpolated(corners);

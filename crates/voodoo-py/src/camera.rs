@@ -90,7 +90,7 @@ pub(crate) fn render_depth<'py>(
     let world_from_sensor = pose("world_from_sensor", world_from_sensor)?;
     let view = Viewpoint { camera: &camera, world_from_sensor };
     let mut image = Rendering::default();
-    py.detach(|| image.render(&body.0, &poses, &view, None)).map_err(raise)?;
+    py.detach(|| image.render(&body.0, &poses, &view)).map_err(raise)?;
     let size = [camera.height(), camera.width()];
     let depth = PyArray1::from_slice(py, image.depth()).reshape(size)?;
     // The mark of no limb, all ones, becomes -1; no body has 32768 limbs.

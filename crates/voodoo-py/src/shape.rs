@@ -88,7 +88,7 @@ impl PyShape {
         let batch = py.detach(|| {
             let (mut queries, mut batch) = (Points::default(), SurfaceBatch::default());
             for index in 0..slice.len() {
-                queries.push(slice.get(index).to_array().map(|value| value as f32));
+                queries.push(slice.get(index).as_vec3().to_array());
             }
             self.0.closest_points(&Pose::IDENTITY, &queries, &mut batch);
             batch

@@ -5,8 +5,6 @@ use voodoo_core::{BodyTracker, LimbMotion, PointSlice, TrackError};
 
 /// Points farther than this from every limb belong to the scene and are not moved, meters.
 const NEAR: f64 = 0.20;
-/// A limb with a greater speed has jumped, meters per second; its points are not moved.
-const FASTEST_LIMB: f64 = 8.0;
 /// Longest time of extrapolation, seconds...
 const LONGEST: f64 = 0.1;
 /// ... and shortest one; for shorter times points are not moved.
@@ -66,7 +64,7 @@ fn carry(points: &mut [Vec3], around: &[usize], away: &[Vec<f32>], motion: &Limb
             continue;
         }
         let velocity = changes[nearest.0].transform_point3(points[index]);
-        if velocity.length() < FASTEST_LIMB * fraction {
+        if velocity.length() < LimbMotion::FASTEST * fraction {
             points[index] += elapsed * velocity;
         }
     }

@@ -2,10 +2,10 @@
 
 use voodoo_core::Unexpected;
 
-/// Depths within this of the nearest 20 % quantile, meters, belong to one surface: a limb is no deeper.
-const ONE_SURFACE: f64 = 0.1;
+/// Depths within this of each other, meters, are of one surface: a limb is no deeper.
+pub(crate) const ONE_SURFACE: f64 = 0.1;
 /// Fewer points than this around a pixel are no surface, since one or two may be stray returns.
-const FEWEST_POINTS: usize = 3;
+pub(crate) const FEWEST_POINTS: usize = 3;
 
 /// Returns the depth of the nearest surface within `radius` of a pixel, meters; `None` with fewer than three points there.
 /// `places` are the columns and rows of points registered to the image, and `depths` their depths, meters.

@@ -4,9 +4,10 @@ use crate::association::correspondence::EdgePair;
 use crate::body::{Body, Limb};
 use crate::math::{Points, Pose, Vec3, refill, smooth_step, vectorized};
 use crate::observation::depth_view::{DepthView, Pixel};
+use crate::visibility::along_limb;
 
 /// Where along a limb its contour is searched for, as fractions of its length; the ends also belong to the neighbors.
-const STATIONS: [f64; 5] = [0.2, 0.35, 0.5, 0.65, 0.8];
+const STATIONS: [f64; 5] = along_limb(0.2);
 /// A return that differs in depth from the limb's axis by more than this plus the limb's half thickness is another object,
 /// meters.
 const DEPTH_REACH: f64 = 0.12;
@@ -195,7 +196,7 @@ impl Contours {
         for view in views {
             for (limb, (part, pose)) in body.limbs().iter().zip(poses).enumerate() {
                 edges(&view, part, pose, |edge| {
-                    self.places.push(edge.place.to_array().map(|value| value as f32));
+                    self.places.push(edge.place.as_vec3().to_array());
                     let target = *pose * (edge.foot + edge.side * (edge.reach - edge.rim));
                     let (source, own, others) = (view.image.source, f32::INFINITY, f32::INFINITY);
                     self.edges.push(LimbEdge { limb, edge, target, source, own, others });

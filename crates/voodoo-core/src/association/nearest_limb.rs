@@ -107,6 +107,12 @@ impl NearestLimb {
     }
 }
 
+/// The greater one of two numbers, as one instruction.
+#[inline(always)]
+fn at_least(value: f32, least: f32) -> f32 {
+    if value > least { value } else { least }
+}
+
 /// Bit mask of the values that are at most `worst`; [`OUTSIDE`] never is.
 #[inline(always)]
 fn within(values: &LimbLanes, worst: f32) -> u32 {
@@ -184,7 +190,6 @@ impl Group {
         let (c, h) = (bounds.center, bounds.half);
         let slack = SINGLE_PRECISION.0
             + SINGLE_PRECISION.1 * [c, h].as_flattened().iter().map(|value| value.abs()).sum::<f32>();
-        let at_least = |value: f32, least: f32| if value > least { value } else { least };
         let mut found = [OUTSIDE; LANES];
         for l in 0..LANES {
             let m = |from: usize, to: usize| self.axes[from][to][l];
@@ -224,11 +229,12 @@ struct LimbBox {
 
 impl LimbBox {
     fn new(limb: &Limb, working_from_limb: &Pose, margin: f64) -> Self {
-        let to_f32 = |v: Vec3| v.to_array().map(|value| value as f32);
+        let to_f32 = |v: Vec3| v.as_vec3().to_array();
         let limb_from_working = working_from_limb.inverse();
         let shape = &limb.shape;
         let bounds = shape.local_aabb().enlarged(margin);
         let ends = [(shape.a0(), shape.b0()), (shape.a1(), shape.b1())];
+        let growth = shape.growth();
         let ratio = |(a, b): (f64, f64)| a.min(b) / a.max(b).max(f64::MIN_POSITIVE);
         Self {
             axes: [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| to_f32(limb_from_working.rotation * axis)),
@@ -236,9 +242,9 @@ impl LimbBox {
             low: to_f32(bounds.mins),
             high: to_f32(bounds.maxs),
             length: shape.length() as f32,
-            a: [shape.a0() as f32, ((shape.a1() - shape.a0()) / shape.length()) as f32],
-            b: [shape.b0() as f32, ((shape.b1() - shape.b0()) / shape.length()) as f32],
-            radius: ends.iter().fold(0.0, |most: f64, (a, b)| most.max(*a).max(*b)) as f32,
+            a: [shape.a0(), growth[0]].map(|value| value as f32),
+            b: [shape.b0(), growth[1]].map(|value| value as f32),
+            radius: shape.max_radius() as f32,
             flatness: ends.map(ratio).into_iter().fold(1.0, f64::min) as f32,
         }
     }
@@ -273,9 +279,8 @@ impl LimbBox {
     /// plus the squared distance beyond its ends.
     #[inline(always)]
     fn square(&self, local: [f32; 3]) -> f32 {
-        let along = if local[2] > 0.0 { local[2] } else { 0.0 };
+        let along = at_least(local[2], 0.0);
         let along = if along < self.length { along } else { self.length };
-        let at_least = |value: f32, least: f32| if value > least { value } else { least };
         let a = at_least(self.a[0] + self.a[1] * along, THINNEST);
         let b = at_least(self.b[0] + self.b[1] * along, THINNEST);
         let over = 1.0 / (a * b);

@@ -10,6 +10,7 @@ use std::ops::Range;
 use crate::association::correspondence::LimbMatches;
 use crate::math::{Pose, Vec3, vectorized};
 use crate::observation::candidates::Candidates;
+use crate::observation::pixels::STRETCH;
 use crate::shape::{MIN_SIZE, Region, TaperedEllipticCylinder};
 
 /// Moves matches of depth pixels inside a limb from the side that faces away from the camera to the near side.
@@ -24,8 +25,8 @@ pub(crate) fn match_visible_side(
     for (end, camera) in &candidates.cameras {
         // The candidate indices of a limb are ascending.
         let stop = start + matches.candidate[start..].partition_point(|candidate| candidate < end);
-        for first in (start..stop).step_by(MATCHES) {
-            let last = stop.min(first + MATCHES);
+        for first in (start..stop).step_by(STRETCH) {
+            let last = stop.min(first + STRETCH);
             let away = vectorized!(facing_away(matches, first..last, camera.as_vec3().to_array()));
             if away.iter().fold(0, |any, away| any | u8::from(*away)) == 0 {
                 continue;
@@ -48,14 +49,11 @@ pub(crate) fn match_visible_side(
     }
 }
 
-/// Matches processed together: a whole number of SIMD lanes.
-const MATCHES: usize = 32;
-
 /// Which matches of points inside the limb are on the side that faces away from a camera.
 #[inline(always)]
-fn facing_away(matches: &LimbMatches, range: Range<usize>, [x, y, z]: [f32; 3]) -> [bool; MATCHES] {
+fn facing_away(matches: &LimbMatches, range: Range<usize>, [x, y, z]: [f32; 3]) -> [bool; STRETCH] {
     let LimbMatches { measured, weight, surface, .. } = matches;
-    let mut away = [false; MATCHES];
+    let mut away = [false; STRETCH];
     let (px, py, pz) = (&measured.x[range.clone()], &measured.y[range.clone()], &measured.z[range.clone()]);
     let normals = &surface.normals;
     let (nx, ny, nz) = (&normals.x[range.clone()], &normals.y[range.clone()], &normals.z[range.clone()]);
@@ -71,7 +69,7 @@ fn facing_away(matches: &LimbMatches, range: Range<usize>, [x, y, z]: [f32; 3]) 
 /// The other end of the chord through a slice, from a surface point along the line of sight (limb frame), and the normal there.
 /// In units of the semi-axes the slice is a circle, and the ends of the chord are mirror images.
 fn near_side(shape: &TaperedEllipticCylinder, point: Vec3, view: Vec3) -> (Vec3, Vec3) {
-    let rates = [(shape.a1() - shape.a0()) / shape.length(), (shape.b1() - shape.b0()) / shape.length()];
+    let rates = shape.growth();
     let (a, b) = (shape.a0() + rates[0] * point.z, shape.b0() + rates[1] * point.z);
     let (a, b) = (a.max(MIN_SIZE), b.max(MIN_SIZE));
     let (x, y) = (point.x / a, point.y / b);

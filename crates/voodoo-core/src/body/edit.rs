@@ -5,6 +5,9 @@ use crate::error::{BodyError, Unexpected};
 use crate::math::Vec3;
 use crate::shape::TaperedEllipticCylinder;
 
+/// Maximum factor by which one look at a free tip stretches or shrinks its limb.
+const MOST_TIP_STRETCH: f64 = 1.25;
+
 /// Limbs of equal length: a left-right pair, or a single limb of the trunk.
 pub(crate) type Pair = Vec<usize>;
 
@@ -49,9 +52,10 @@ impl Body {
         self.reshape(limb, 1.0, axes, |position| position - shift)
     }
 
-    /// Lengthens the surface of a limb by a factor; joints and sites stay. Does nothing if the result would not be a valid solid.
+    /// Lengthens the surface of a limb with a free tip by a factor, within limits; joints and sites stay. Does nothing if the result
+    /// would not be a valid solid.
     pub(crate) fn change_tip(&mut self, limb: usize, factor: f64) {
-        self.reshape(limb, factor, [1.0; 4], |position| position);
+        self.reshape(limb, factor.clamp(1.0 / MOST_TIP_STRETCH, MOST_TIP_STRETCH), [1.0; 4], |position| position);
     }
 
     /// Limbs that have children, grouped into left-right pairs of equal length.

@@ -3,7 +3,7 @@
 use super::{Body, Joint, JointKind};
 use crate::body::kinematics::{hinge_axis, joint_turn};
 use crate::error::{TrackError, Unexpected};
-use crate::math::{Aabb, Mat3, Moments, Pose, Quat, Vec3, is_place};
+use crate::math::{Aabb, Mat3, Moments, PLACE, Pose, Quat, Vec3, is_place};
 
 /// A hinge bent by less than this does not determine its axis: sine of the angle between its limbs.
 const BENT: f64 = 0.3;
@@ -30,8 +30,9 @@ const PRIOR_LEVER: f64 = 0.1;
 
 /// Landmarks that are at least this fraction of a limb's length apart along its axis determine its length.
 const SPREAD_ALONG: f64 = 0.3;
-/// Maximum factor by which a limb is stretched or shrunk. A larger factor indicates another person or a wrong landmark.
-const MOST_STRETCH: f64 = 2.0;
+/// Maximum factor by which a limb is stretched or shrunk, by landmarks or by all frames together. A larger factor indicates another
+/// person or a wrong landmark.
+pub(crate) const MOST_STRETCH: f64 = 2.0;
 /// Points are collinear when the sum of pairwise products of their scatter's eigenvalues is below this fraction of its squared
 /// trace: their width is then a hundredth of their length.
 const ON_A_LINE: f64 = 1e-4;
@@ -50,7 +51,7 @@ impl Body {
             let unknown = || Unexpected::new("joints", "the index of a site", index);
             let site = self.sites.get(*index).ok_or_else(unknown)?;
             let (what, found) = (format_args!("joints[{}]", site.name), format_args!("{position:?}"));
-            Unexpected::unless(is_place(*position), what, "finite meters, 1e9 at most", found)?;
+            Unexpected::unless(is_place(*position), what, PLACE, found)?;
         }
         let farthest = positions.iter().map(|(_, position)| position.abs().max_element()).fold(0.0, f64::max);
         if farthest <= NEAR_ORIGIN {

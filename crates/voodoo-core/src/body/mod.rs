@@ -12,6 +12,7 @@ pub(crate) mod shoulders;
 pub(crate) mod two_bone;
 
 pub(crate) use edit::Pair;
+pub(crate) use fit::MOST_STRETCH;
 pub use human::HumanModel;
 pub use joint::{Joint, JointKind};
 pub(crate) use model::Model;
@@ -19,7 +20,7 @@ pub(crate) use roles::JointRole;
 pub use roles::{LimbRole, Roles, Side};
 
 use crate::error::{BodyError, Unexpected};
-use crate::math::{Pose, Vec3, is_place, is_rigid};
+use crate::math::{PLACE, Pose, Vec3, is_place, is_rigid};
 use crate::shape::TaperedEllipticCylinder;
 use std::fmt::{Arguments, Display};
 use std::sync::Arc;
@@ -220,7 +221,7 @@ impl Body {
             check_name(key, &site.name, self.sites[..index].iter().map(|other| &other.name))?;
             Unexpected::unless(site.limb < limbs, format_args!("{key}.limb"), "the index of a limb", site.limb)?;
             let (key, found) = (format_args!("{key}.position"), site.position.to_array());
-            Unexpected::unless(is_place(site.position), key, "finite meters, 1e9 at most", format_args!("{found:?}"))?;
+            Unexpected::unless(is_place(site.position), key, PLACE, format_args!("{found:?}"))?;
         }
         Ok(())
     }

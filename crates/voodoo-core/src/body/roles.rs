@@ -195,7 +195,7 @@ impl Roles {
     }
 
     /// The limb whose joint to its parent has this role; the first of several.
-    pub(crate) fn limb_at(&self, joint: JointRole) -> Option<usize> {
+    fn limb_at(&self, joint: JointRole) -> Option<usize> {
         self.joints.iter().position(|role| *role == Some(joint))
     }
 

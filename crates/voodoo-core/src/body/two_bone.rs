@@ -60,6 +60,11 @@ impl TwoBone {
         [self.upper, self.lower].into_iter().chain(self.ends.iter().copied())
     }
 
+    /// Whether a limb is one of the chain.
+    pub(crate) fn has(&self, limb: usize) -> bool {
+        self.limbs().any(|own| own == limb)
+    }
+
     /// Center of the ball joint.
     pub(crate) fn root(&self, body: &Body, poses: &[Pose]) -> Vec3 {
         match &body.limbs()[self.upper].parent {

@@ -239,7 +239,8 @@ fn unbend<const N: usize>(k: &[f64; N], target: [f64; 2], domain: f64) -> Option
     if !square.is_finite() {
         return None;
     }
-    let shrink = if square > 0.9 * domain { (0.9 * domain / square).sqrt() } else { 1.0 };
+    let inside = 0.9 * domain;
+    let shrink = if square > inside { (inside / square).sqrt() } else { 1.0 };
     let mut at = target.map(|value| shrink * value);
     let miss = |at: [f64; 2]| {
         let [x, y] = bend(k, at);

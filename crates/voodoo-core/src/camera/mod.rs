@@ -13,9 +13,6 @@ pub use lens::Lens;
 /// Maximum number of pixels of an image, those of an 8K image. A larger size is probably a typing error and would need gigabytes
 /// of memory.
 pub(crate) const MOST_PIXELS: usize = 1 << 25;
-/// Minimum distance of a point from the camera plane, meters. Nearer points are in no pixel: no sensor measures there, and the
-/// projection diverges.
-pub(crate) const NEAREST_RETURN: f64 = 0.05;
 /// Number of parts into which each side of a rectangle is divided to follow its image through a lens.
 const SIDE_PARTS: usize = 16;
 
@@ -67,6 +64,10 @@ impl PartialEq for Camera {
 }
 
 impl Camera {
+    /// Minimum distance of a point from the camera plane, meters. Nearer points are in no pixel: no sensor measures there, and the
+    /// projection diverges.
+    pub const NEAREST: f64 = 0.05;
+
     /// A camera of `width` x `height` pixels with the `intrinsics` `(fx, fy, cx, cy)`, pixels.
     ///
     /// # Errors
@@ -257,7 +258,7 @@ impl Camera {
         let whole = [0..self.width, 0..self.height];
         let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
         for corner in corners {
-            if !(corner.z >= NEAREST_RETURN) {
+            if !(corner.z >= Self::NEAREST) {
                 return whole;
             }
             let ray = [corner.x / corner.z, corner.y / corner.z];

@@ -152,7 +152,7 @@ mod tests {
             let middle = poses[limb] * (0.5 * body.limbs()[limb].shape.length() * Vec3::Z);
             let aside = (RADIUS + beyond) * (poses[limb].rotation * Vec3::X);
             let (mut points, mut weights) = (Points::default(), [1.0]);
-            points.push((middle + aside).to_array().map(|value| value as f32));
+            points.push((middle + aside).as_vec3().to_array());
             limbs.weigh(limb, RADIUS, &points, &mut weights);
             f64::from(weights[0])
         };

@@ -46,8 +46,7 @@ impl Skeleton {
 
     /// Measures the lengths between joints: the mean of both sides, or the one side that is known.
     pub(super) fn measure(&self, joints: &[Option<Vec3>]) -> OptionalLengths {
-        let at = |index: Option<usize>| joints.get(index?).copied().flatten();
-        let apart = |from: Option<usize>, to: Option<usize>| Some(at(from)?.distance(at(to)?));
+        let apart = |from: Option<usize>, to: Option<usize>| Some(at(joints, from)?.distance(at(joints, to)?));
         let mean = |sides: [Option<f64>; 2]| match sides {
             [Some(left), Some(right)] => Some(0.5 * (left + right)),
             [left, right] => left.or(right),
@@ -69,8 +68,7 @@ impl Skeleton {
     /// Sets the limbs to these lengths. Limb directions and the middle of the trunk stay.
     pub(super) fn take_lengths(&self, joints: &mut [Option<Vec3>], lengths: &OptionalLengths) {
         let [upper_arm, forearm, thigh, shank, shoulders, hips, trunk, neck] = *lengths;
-        let at = |index: Option<usize>| joints.get(index?).copied().flatten();
-        let (root, top, head) = (at(self.root), at(self.top), at(self.head));
+        let [root, top, head] = [self.root, self.top, self.head].map(|index| at(joints, index));
         let [mut up, mut down] = [Vec3::ZERO; 2];
         if let (Some(root), Some(top), Some(trunk)) = (root, top, trunk) {
             let (middle, along) = (0.5 * (root + top), (top - root).normalize_or_zero());
@@ -89,6 +87,10 @@ impl Skeleton {
     }
 }
 
+fn at(joints: &[Option<Vec3>], index: Option<usize>) -> Option<Vec3> {
+    joints.get(index?).copied().flatten()
+}
+
 fn set(joints: &mut [Option<Vec3>], index: Option<usize>, position: Option<Vec3>) {
     if let Some(joint) = index.and_then(|index| joints.get_mut(index)) {
         *joint = position;
@@ -104,7 +106,7 @@ fn limbs<const N: usize>(
     lengths: [Option<f64>; 2],
     moved: Vec3,
 ) {
-    let before = sides.map(|side| side.map(|index| joints.get(index?).copied().flatten()));
+    let before = sides.map(|side| side.map(|index| at(joints, index)));
     let mut roots = before.map(|side| side[0].map(|root| root + moved));
     if let ([Some(left), Some(right)], Some(width)) = (before.map(|side| side[0]), width) {
         let (middle, half) = (0.5 * (left + right) + moved, 0.5 * width * (left - right).normalize_or_zero());

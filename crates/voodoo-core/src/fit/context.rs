@@ -1,7 +1,6 @@
 //! Read-only inputs of everything that estimates a pose in a frame.
 
 use crate::body::Model;
-use crate::body::two_bone::TwoBone;
 use crate::config::Config;
 use crate::math::Pose;
 use crate::observation::observer::Observation;
@@ -38,10 +37,7 @@ impl<'a> Context<'a> {
     /// Whether color edges are used for a limb: for all limbs without points, and for arms with points, which are blurred there
     /// but reliable for legs.
     pub(crate) fn uses_edges(&self, limb: usize) -> bool {
-        self.compares_colors() || {
-            let arms = self.model.extremities.iter().filter(|chain| !chain.leg);
-            arms.flat_map(TwoBone::limbs).any(|own| own == limb)
-        }
+        self.compares_colors() || { self.model.extremities.iter().any(|chain| !chain.leg && chain.has(limb)) }
     }
 
     /// Whether the colors of pixels compare poses: where no point was measured near the body. Points and pixels of the same

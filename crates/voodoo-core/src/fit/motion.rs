@@ -13,8 +13,8 @@ const LONGEST_PREDICTION: f64 = 2.0;
 pub(crate) const UNKNOWN_MOTION: f64 = 4.0;
 /// Frame rate for which the standard deviations of motion priors are given, 1/s.
 const REFERENCE_RATE: f64 = 30.0;
-/// Shortest and longest interval to which the priors are scaled, in frames of that rate.
-const TIME_SCALES: [f64; 2] = [0.1, 10.0];
+/// Priors are scaled to intervals of up to so many frames of that rate, and down to the same part of one.
+const MOST_TIMES: f64 = 10.0;
 
 /// Poses of the body over time, all in the working frame: world axes, origin near the body.
 #[derive(Debug, Default)]
@@ -79,8 +79,7 @@ impl Motion {
             self.poses.clone_from(&self.predicted);
         }
         // Over short intervals, unexpected motion adds up like noise; over long ones, the speed is unknown.
-        let [least, most] = TIME_SCALES;
-        let scale = step.map_or(1.0, |step| (step * REFERENCE_RATE).clamp(least, most));
+        let scale = step.map_or(1.0, |step| (step * REFERENCE_RATE).clamp(1.0 / MOST_TIMES, MOST_TIMES));
         let scale = scale.max(scale.sqrt());
         match self.interval {
             None if step.is_some() => scale * UNKNOWN_MOTION,
@@ -174,7 +173,7 @@ mod tests {
         let scale = motion.advance(&body, 5.0, 1.0, true);
         let moved = motion.world_from_limb().next().unwrap().translation - before.translation;
         assert!((moved - LONGEST_PREDICTION * STEP).length() < 1e-9);
-        assert_eq!(scale, TIME_SCALES[1]);
+        assert_eq!(scale, MOST_TIMES);
     }
 
     #[test]

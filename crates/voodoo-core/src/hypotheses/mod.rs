@@ -82,8 +82,7 @@ impl Hypotheses {
                 continue;
             }
             if by_colors {
-                let is_other = |limb| chain.limbs().all(|own| own != limb);
-                fit.regions.draw(context.posed(poses), is_other);
+                fit.regions.draw(context.posed(poses), |limb| !chain.has(limb));
             }
             self.propose(Extremity::new(context, fit, poses, chain), detection);
             let Self { proposals, refined, unexplained, .. } = self;

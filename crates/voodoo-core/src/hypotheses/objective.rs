@@ -4,8 +4,9 @@ use crate::association::correspondence::Correspondences;
 use crate::fit::{Context, Fit};
 use crate::math::Pose;
 use crate::regions::ColorRegions;
-use crate::solver::{OVERLAP_SIGMA, SITE_SCALE};
-use crate::terms::{DetectedJoints, Floor, Limits, PATCH, Penetration, Sites, Term, cost_of_points, stance_cost};
+use crate::terms::{
+    PATCH, cost_of_points, detected_cost, floor_cost, limit_cost, penetration_cost, site_cost, stance_cost,
+};
 use crate::visibility::evidence::limb_visibility;
 
 /// Decrease of the cost at which another pose is better, nats: the odds are 20 to 1. An arm or leg is tested only where that much
@@ -24,43 +25,40 @@ pub(crate) struct Objective<'a> {
     /// The correspondences, and the poses at which they were found.
     pub correspondences: &'a Correspondences,
     pub poses: &'a [Pose],
-    /// Cost of an unexplained patch in this frame, in those of a usual frame.
-    pub clutter: f64,
     /// The color regions where they compare poses, with the limbs drawn that are not compared, or the whole body.
     pub regions: Option<&'a ColorRegions>,
 }
 
 impl<'a> Objective<'a> {
     /// That of matched poses, with the colors where these compare poses.
-    pub(super) fn new(context: Context<'a>, fit: &'a Fit, poses: &'a [Pose], clutter: f64) -> Self {
+    pub(super) fn new(context: Context<'a>, fit: &'a Fit, poses: &'a [Pose]) -> Self {
         let regions = context.compares_colors().then_some(&fit.regions);
-        Self { context, correspondences: &fit.correspondences, poses, clutter, regions }
+        Self { context, correspondences: &fit.correspondences, poses, regions }
     }
 
     /// Cost of the pose of one limb but for the points.
     pub(crate) fn limb(&self, poses: &[Pose], limb: usize) -> f64 {
         let Self { context, correspondences, regions, .. } = *self;
-        let Context { model, observation, config, .. } = context;
-        let information = config.point_information();
-        let (body, pairs, floor) = (&model.body, &correspondences.detected, observation.floor());
-        let cost = |term: &dyn Term| term.cost(body, poses, limb);
+        let Context { model, observation, .. } = context;
+        let (body, floor) = (&model.body, observation.floor());
         let of_colors = |regions: &ColorRegions| -PATCH * regions.pixel_gain(context.posed(poses), limb)[0];
         VIOLATION * PATCH * limb_visibility(observation.views, &body.limbs()[limb], &poses[limb]).free_space
-            + cost(&Sites { correspondences, information, scale: SITE_SCALE, biased: true })
-            + cost(&DetectedJoints { pairs })
+            + site_cost(&correspondences.sites, poses, limb)
+            + detected_cost(&correspondences.detected, body, poses, limb)
             + regions.map_or(0.0, of_colors)
-            + cost(&Limits)
-            + cost(&Penetration { sigma: OVERLAP_SIGMA, spheres: &[] })
-            + floor.map_or(0.0, |plane| cost(&Floor { plane, sigma: OVERLAP_SIGMA }))
+            + limit_cost(body, poses, limb)
+            + penetration_cost(body, poses, limb)
+            + floor.map_or(0.0, |floor| floor_cost(floor, body, poses, limb))
             + floor.map_or(0.0, |floor| stance_cost(floor, model, poses, limb))
     }
 
-    /// Cost of the matched poses of the whole body. A point that no limb explains costs the surface for which it stands.
-    pub(crate) fn body(&self) -> f64 {
+    /// Cost of the matched poses of the whole body. A point that no limb explains costs the surface for which it stands, where a patch
+    /// costs `clutter` of those of a usual frame.
+    pub(crate) fn body(&self, clutter: f64) -> f64 {
         let candidates = self.context.observation.candidates;
         let explained: f64 = self.correspondences.limbs.iter().map(|limb| cost_of_points(limb, candidates)).sum();
         let limbs = (0..self.poses.len()).map(|limb| self.limb(self.poses, limb));
-        self.clutter * (PATCH * candidates.area() + explained) + limbs.sum::<f64>()
+        clutter * (PATCH * candidates.area() + explained) + limbs.sum::<f64>()
     }
 }
 
@@ -81,7 +79,7 @@ mod tests {
                 fit.match_last(context, poses, true);
                 let (before, written) = (poses.clone(), format!("{:?}", fit.correspondences));
                 let correspondences = &fit.correspondences;
-                let cost = || Objective { context, correspondences, poses, clutter: 1.0, regions: None }.body();
+                let cost = || Objective { context, correspondences, poses, regions: None }.body(1.0);
                 assert_eq!(cost().to_bits(), cost().to_bits(), "the cost of the same input must not change");
                 assert_eq!((&before, written), (poses, format!("{:?}", fit.correspondences)));
                 cost()
@@ -119,8 +117,8 @@ mod tests {
                 fit.match_last(context, &poses, true);
                 let all = context.observation.candidates.area();
                 let correspondences = &fit.correspondences;
-                let objective = Objective { context, correspondences, poses: &poses, clutter: 1.0, regions: None };
-                (objective.body(), PATCH * all)
+                let objective = Objective { context, correspondences, poses: &poses, regions: None };
+                (objective.body(1.0), PATCH * all)
             })
         };
         let alone = before_wall(&model.body, &poses);

@@ -137,7 +137,7 @@ mod tests {
     fn cluster(points: &mut WeightedPoints, middle: Vec3, count: usize) {
         for index in 0..count {
             let around = Vec3::new((index as f64).sin(), (2.0 * index as f64).cos(), (3.0 * index as f64).sin());
-            points.push((middle + 0.02 * around).to_array().map(|value| value as f32), 1.0);
+            points.push((middle + 0.02 * around).as_vec3().to_array(), 1.0);
         }
     }
 

@@ -93,7 +93,7 @@ impl Refined {
         if context.compares_colors() {
             fit.regions.draw(context.posed(poses), |_| true);
         }
-        Objective::new(context, fit, poses, self.clutter).body()
+        Objective::new(context, fit, poses).body(self.clutter)
     }
 }
 

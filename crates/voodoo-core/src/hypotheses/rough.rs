@@ -24,7 +24,7 @@ pub(super) struct Extremity<'a> {
 
 impl<'a> Extremity<'a> {
     pub(super) fn new(context: Context<'a>, fit: &'a Fit, poses: &'a [Pose], chain: &'a TwoBone) -> Self {
-        Self { objective: Objective::new(context, fit, poses, 1.0), chain }
+        Self { objective: Objective::new(context, fit, poses), chain }
     }
 
     /// Center of its ball joint, working frame.
@@ -68,14 +68,14 @@ impl RoughSearch {
         for limb in at.chain.limbs() {
             let matches = &at.objective.correspondences.limbs[limb];
             for index in (0..matches.weight.len()).filter(|index| matches.weight[*index] > 0.0) {
-                let point = matches.measured.get(index).to_array().map(|value| value as f32);
+                let point = matches.measured.get(index).as_vec3().to_array();
                 sample.push(point, matches.area(index, candidates));
             }
         }
         sample.subsample(ROUGH_SAMPLE);
         reset(others, sample.weights.len(), f32::INFINITY);
         let (body, poses) = (&at.objective.context.model.body, at.objective.poses);
-        for limb in (0..poses.len()).filter(|limb| at.chain.limbs().all(|own| own != *limb)) {
+        for limb in (0..poses.len()).filter(|limb| !at.chain.has(*limb)) {
             explain(body, limb, poses, &sample.points, others, distances);
         }
     }

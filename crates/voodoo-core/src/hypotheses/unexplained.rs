@@ -55,7 +55,7 @@ impl Unexplained {
         for index in 0..self.points.weights.len() {
             let (point, weight) = self.points.get(index);
             if (point - place).length() < reach {
-                near.push(point.to_array().map(|value| value as f32), weight);
+                near.push(point.as_vec3().to_array(), weight);
             }
         }
     }

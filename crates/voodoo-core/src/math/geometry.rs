@@ -161,6 +161,9 @@ impl Aabb {
 /// of coordinates have no digits left for a body, and finally overflow.
 const FARTHEST: f64 = 1e9;
 
+/// What is expected of a position.
+pub(crate) const PLACE: &str = "finite meters, 1e9 at most";
+
 /// Whether a position is valid: no coordinate is NaN or beyond [`FARTHEST`].
 pub(crate) fn is_place(place: Vec3) -> bool {
     place.abs().cmple(Vec3::splat(FARTHEST)).all()

@@ -4,9 +4,11 @@ use crate::math::{Pose, refill};
 use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::ownership::OwnershipMask;
 
-/// A pixel belongs to the background unless it lies more than this in front of it: meters, plus a fraction of the depth, because
-/// the noise of depth cameras grows with depth.
-const SCENE_MARGIN: (f32, f32) = (0.04, 0.012);
+/// Depths that differ by more than this are not of one surface: meters, plus a fraction of the depth, because the noise of depth
+/// cameras grows with depth.
+pub const SURFACE_STEP: [f32; 2] = [0.04, 0.012];
+/// Depths of the scene that differ by less than this are of one surface, meters.
+pub(crate) const SCENE_STEP: f32 = 0.15;
 /// A camera that moved by no more than this counts as static: meters, and radians. The odometry of a stationary robot varies by
 /// less.
 const STANDS: (f64, f64) = (0.003, 0.0015);
@@ -49,10 +51,10 @@ pub(super) fn pose_difference(a: &Pose, b: &Pose) -> (f64, f64) {
 }
 
 impl Background {
-    /// Whether a return at `z` meters in pixel `index` belongs to the background.
+    /// Whether a return at `z` meters belongs to a background at this depth: it is not clearly in front of it.
     #[inline(always)]
     pub(crate) fn contains(depth: f32, z: f32) -> bool {
-        depth > 0.0 && z > depth - SCENE_MARGIN.0 - SCENE_MARGIN.1 * depth
+        depth > 0.0 && z > depth - SURFACE_STEP[0] - SURFACE_STEP[1] * depth
     }
 
     /// Whether this background belongs to the image: to the same camera at the same pose.

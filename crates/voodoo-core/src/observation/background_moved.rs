@@ -1,6 +1,6 @@
 //! Carries a learned scene over to a new camera pose: its surfaces are static in the world.
 
-use super::background::{Background, Backgrounds, pose_difference};
+use super::background::{Background, Backgrounds, SCENE_STEP, pose_difference};
 use super::candidates::columns_f32;
 use super::frame::{DepthImage, Frame};
 use crate::math::{Vec3, reset};
@@ -11,8 +11,6 @@ const LEAPS: (f64, f64) = (0.5, 0.5);
 const GONE: f64 = 3.0;
 /// Surfaces nearer to the camera plane than this are not carried over, meters: no sensor measures there.
 const NEAREST_CARRIED: f32 = 0.1;
-/// The two sides of a crack belong to one surface when their depths differ by less than this, meters.
-const CRACK_STEP: f32 = 0.15;
 
 impl Backgrounds {
     /// Gives an image that has none a background. If the same camera learned one at another pose nearby, that is carried over to the
@@ -88,7 +86,7 @@ impl Background {
     fn close_cracks(&mut self, step: usize) {
         for index in step..self.depth.len().saturating_sub(step) {
             let (a, b) = (self.depth[index - step], self.depth[index + step]);
-            if self.depth[index] == 0.0 && a > 0.0 && b > 0.0 && (a - b).abs() < CRACK_STEP {
+            if self.depth[index] == 0.0 && a > 0.0 && b > 0.0 && (a - b).abs() < SCENE_STEP {
                 self.depth[index] = 0.5 * (a + b);
             }
         }
@@ -96,7 +94,7 @@ impl Background {
 }
 
 /// Stands for the ray through the pixel center.
-pub(super) const NO_RAY: [f32; 2] = [f32::INFINITY; 2];
+const NO_RAY: [f32; 2] = [f32::INFINITY; 2];
 
 #[cfg(test)]
 mod tests {

@@ -166,7 +166,7 @@ impl Candidates {
         };
         for index in 0..cloud.points.len() {
             let point = rotation * cloud.points.get(index) + shift;
-            let point = point.to_array().map(|value| value as f32);
+            let point = point.as_vec3().to_array();
             if cloud.scope != Scope::Free || gate.passes(point) && !others(index) {
                 self.push(point, [cloud.weight as f32; 2], limb, cloud.source);
             }
@@ -226,7 +226,7 @@ pub(crate) fn image_window(
 /// Columns of the rotation, then the translation.
 pub(super) fn columns_f32(pose: &Pose) -> [[f32; 3]; 4] {
     [pose.rotation * Vec3::X, pose.rotation * Vec3::Y, pose.rotation * Vec3::Z, pose.translation]
-        .map(|column| column.to_array().map(|value| value as f32))
+        .map(|column| column.as_vec3().to_array())
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! What the pixels of a depth image show at a position in space.
 
-use crate::camera::NEAREST_RETURN;
+use crate::camera::Camera;
 use crate::math::{Pose, Vec3, refill, shifted};
 use crate::observation::background::{Background, OTHERS};
 use crate::observation::frame::{DepthImage, Frame};
@@ -68,7 +68,7 @@ impl DepthView<'_> {
     #[inline(always)]
     pub(crate) fn at(&self, point: Vec3) -> Pixel {
         let image = self.image;
-        if point.z < NEAREST_RETURN {
+        if point.z < Camera::NEAREST {
             return Pixel::Unknown;
         }
         image.camera.index_of(point).map_or(Pixel::Unknown, |index| self.pixel(index))
@@ -95,7 +95,7 @@ impl DepthView<'_> {
     pub(crate) fn shares(&self, point: Vec3, deep: f64) -> Shares {
         let mut found = Shares::default();
         let camera = &self.image.camera;
-        let Some([u, v]) = camera.project(point).filter(|_| point.z >= NEAREST_RETURN) else { return found };
+        let Some([u, v]) = camera.project(point).filter(|_| point.z >= Camera::NEAREST) else { return found };
         let (width, height) = (camera.width() as f64, camera.height() as f64);
         if !(u > -1.0 && v > -1.0 && u < width && v < height) {
             return found;

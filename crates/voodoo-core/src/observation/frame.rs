@@ -5,7 +5,7 @@ use std::fmt::Display;
 use crate::body::Body;
 use crate::camera::Camera;
 use crate::error::{TrackError, Unexpected};
-use crate::math::{Aabb, Pose, Vec3, is_place, is_rigid};
+use crate::math::{Aabb, PLACE, Pose, Vec3, is_place, is_rigid};
 use crate::observation::picture::ColorImage;
 
 /// Median depths that cameras measure, meters: meters taken for millimeters are below, and millimeters taken for meters beyond.
@@ -450,9 +450,6 @@ fn check_weight(what: impl Display, weight: f64) -> Result<(), Unexpected> {
     let valid = (weight as f32).is_finite() && weight > 0.0;
     Unexpected::unless(valid, what, "a weight above zero, 1e38 at most", weight)
 }
-
-/// What is expected of a position.
-const PLACE: &str = "finite meters, 1e9 at most";
 
 /// Rejects a position that is not valid.
 fn check_place(what: impl Display, place: Vec3) -> Result<(), Unexpected> {

@@ -48,8 +48,8 @@ impl Grid {
     }
 }
 
-/// Pixels of a row that are processed together: a whole number of SIMD lanes.
-pub(super) const STRETCH: usize = 32;
+/// Pixels of a row, or points, that are processed together: a whole number of SIMD lanes.
+pub(crate) const STRETCH: usize = 32;
 
 /// Visits every `stride`th value together with its slot in `to`; neighbors fill whole registers.
 #[inline(always)]

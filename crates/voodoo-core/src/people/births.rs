@@ -9,6 +9,7 @@ use crate::detect::{Detected, DetectionQuery, PlacedDetection, Surroundings, fit
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::{DepthImage, Frame, PositionRelation};
 use crate::observation::ownership::NO_OWNER;
+use crate::relocalize::ENOUGH_ODDS;
 
 /// Shortest time between two detections in pixels that no person explains, seconds, while anybody is tracked.
 const DETECT_EVERY: f64 = 0.06;
@@ -203,7 +204,7 @@ impl People {
         let tracks: Vec<&TentativeTrack> = confirmed.iter().chain(self.tentative.updated_at(frame.stamp)).collect();
         let costs: Vec<Vec<f64>> = tracks.iter().copied().enumerate().map(cost).collect();
         // A detection that nobody is left for may be of somebody new, or of nobody.
-        let known = assign::assign(&costs, |row| tracks[row].log_odds.min(NEW));
+        let known = assign::assign(&costs, |row| tracks[row].log_odds.min(ENOUGH_ODDS));
         let known: Vec<Option<usize>> = known.into_iter().map(|column| column.map(|column| absent[column])).collect();
         let numbers = self.assign_to_newcomers(frame, confirmed, &known);
         for ((track, known), own) in confirmed.iter().zip(known).zip(numbers) {
@@ -377,8 +378,6 @@ fn sites_of(positions: &[PositionRelation]) -> Vec<(usize, Vec3)> {
 
 /// Cost of each track that comes before, nats: of equal ones the first is taken.
 const FIRST: f64 = 1e-6;
-/// Cost of a new person in the assignment, nats.
-pub(super) const NEW: f64 = 4.0;
 /// Mean and standard deviation of the clothes distance between two views of one person.
 const CLOTHES: [f64; 2] = [0.10, 0.07];
 /// Evidence of equal clothes for the same person, nats.

@@ -5,12 +5,11 @@ use crate::math::{Pose, Vec3};
 use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::picture::ColorImage;
 use crate::visibility::surface::surface_rows;
+use crate::visibility::{EXPLAINED, across_limb};
 
 /// Positions across a limb at which colors are sampled, as fractions of its radius from the axis. The rim is left out because its
 /// pixels may show the background.
-const ACROSS: [f64; 5] = [-0.5, -0.25, 0.0, 0.25, 0.5];
-/// Tolerance between measured and expected depth of a limb's surface, meters: clothes are thick.
-const SURFACE_TOLERANCE: f64 = 0.08;
+const ACROSS: [f64; 5] = across_limb(0.5);
 /// Number of bins of brightness and of the two color differences.
 const BINS: [usize; 3] = [5, 9, 9];
 /// Range of the color differences that the bins cover; clothes rarely exceed it.
@@ -104,7 +103,7 @@ impl ClothesHistogram {
 fn surface(image: &DepthImage, place: Vec3, own: impl Fn(usize) -> bool) -> Option<Vec3> {
     let pixel = image.camera.index_of(place)?;
     let z = f64::from(image.pixels.get(pixel)) * image.meters_per_unit;
-    ((z - place.z).abs() < SURFACE_TOLERANCE && own(pixel)).then(|| place * (z / place.z))
+    ((z - place.z).abs() < 2.0 * EXPLAINED && own(pixel)).then(|| place * (z / place.z))
 }
 
 /// Returns a picture's color at a world position.
@@ -120,7 +119,8 @@ fn add(counts: &mut [f32], [first, green, last]: [u8; 3]) {
     let brightness = 0.2 * x + 0.6 * y + 0.2 * z;
     let place = |value: f32, bins: usize| (value * (bins - 1) as f32).clamp(0.0, (bins - 1) as f32);
     let difference = |value: f32| (value - brightness) / (2.0 * COLORFUL) + 0.5;
-    let at = [place(brightness / 255.0, BINS[0]), place(difference(x), BINS[1]), place(difference(z), BINS[2])];
+    let at =
+        [place(brightness / f32::from(u8::MAX), BINS[0]), place(difference(x), BINS[1]), place(difference(z), BINS[2])];
     for corner in 0..8_usize {
         let (mut index, mut weight) = (0, 1.0);
         for axis in 0..3 {

@@ -21,9 +21,9 @@ use crate::detect::{BoundDetector, Detect, DetectError};
 use crate::error::{TrackError, Unexpected};
 use crate::math::Vec3;
 use crate::observation::frame::{DetectedPerson, Frame, PositionRelation};
+use crate::relocalize::ENOUGH_ODDS;
 use crate::threads::Threads;
 use crate::tracker::BodyTracker;
-use births::NEW;
 pub use options::PeopleOptions;
 use person::Person;
 use pixel_assignment::{PixelAssignment, PredictedBody};
@@ -142,7 +142,7 @@ impl People {
         person.present = true;
         person.place = person.tracker.estimate().world_from_limb.first().map_or(Vec3::ZERO, |root| root.translation);
         let far = |known: &Person| known.distance_cost(person.place, stamp);
-        let known = self.persons.iter_mut().filter(|known| !known.is_tracked() && far(known) < NEW);
+        let known = self.persons.iter_mut().filter(|known| !known.is_tracked() && far(known) < ENOUGH_ODDS);
         if let Some(known) = known.min_by(|a, b| far(a).total_cmp(&far(b))) {
             known.tracker.reset(positions, false)?;
             (known.present, known.place) = (true, person.place);

@@ -12,6 +12,7 @@ use crate::relocalize::{NEW_TRACK_AGE, distance_cost};
 use crate::sizes::LengthEstimate;
 use crate::tracker::BodyTracker;
 use crate::tracker::estimate::Status;
+use crate::visibility::EXPLAINED;
 
 /// A lost person whose position is in view and not hidden becomes absent after this, seconds.
 const LEAVES: f64 = 0.3;
@@ -21,8 +22,6 @@ const OUTSIDE: f64 = 0.1;
 const HIDDEN: f64 = 2.0;
 /// Shortest time between two updates of the clothes, seconds.
 const CLOTHES_EVERY: f64 = 0.3;
-/// A measurement nearer than a position by this occludes it, meters.
-const HIDES: f64 = 0.08;
 
 /// A person, present or absent.
 #[derive(Debug)]
@@ -163,7 +162,7 @@ impl Person {
         for site in sites {
             let depths = || frame.images.iter().filter_map(|image| image.measured(*site));
             outside += usize::from(depths().next().is_none());
-            hidden += usize::from(depths().any(|[z, place]| z > 0.0 && z < place - HIDES));
+            hidden += usize::from(depths().any(|[z, place]| z > 0.0 && z < place - 2.0 * EXPLAINED));
         }
         match sites.len() / 2 {
             half if hidden > half => HIDDEN,

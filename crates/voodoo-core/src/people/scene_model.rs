@@ -1,14 +1,11 @@
 //! Model of the static scene shared by all persons, learned in pixels that no person owns.
 
-use crate::observation::background::{Background, Backgrounds};
+use crate::observation::background::{Background, Backgrounds, SCENE_STEP};
 use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::ownership::NO_OWNER;
 
 /// One row in this many is learned per frame, for speed; the scene is static.
 const LEARNED_ROWS: usize = 8;
-/// Depth step, meters: a return deeper by more than this replaces the learned depth; other returns not nearer by this are
-/// averaged into it.
-const DEPTH_STEP: f32 = 0.15;
 /// Weight of a new return in the learned depth.
 const NEW_DEPTH: f32 = 0.1;
 /// Number of consecutive observations after which a return becomes part of the scene, where no depth was known and where a deeper
@@ -66,7 +63,7 @@ impl SceneModel {
                     // Something new is clearly before the known scene, or where nothing was seen before.
                     let is_new = |z: &f32| {
                         known[index] == 0.0 && pending[index] == 0.0
-                            || *z < known[index] - DEPTH_STEP && !Background::contains(known[index], *z)
+                            || *z < known[index] - SCENE_STEP && !Background::contains(known[index], *z)
                     };
                     match depth.filter(is_new) {
                         Some(z) => (new, width) = (new + 1, width + f64::from(z) / image.camera.focal()[0]),
@@ -94,9 +91,10 @@ impl SceneModel {
     }
 }
 
+/// Learns a return: a deeper surface replaces the learned one, and returns of the same one are averaged.
 fn learn_pixel(known: &mut f32, tentative: &mut f32, frames: &mut u8, z: f32) {
-    if *known > 0.0 && z > *known - DEPTH_STEP {
-        *known = if z > *known + DEPTH_STEP { z } else { *known + NEW_DEPTH * (z - *known) };
+    if *known > 0.0 && z > *known - SCENE_STEP {
+        *known = if z > *known + SCENE_STEP { z } else { *known + NEW_DEPTH * (z - *known) };
         *frames = 0;
         return;
     }

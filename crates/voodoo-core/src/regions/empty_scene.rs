@@ -4,11 +4,13 @@ use super::histogram::SIDE;
 use crate::error::Unexpected;
 use crate::observation::picture::{ColorImage, ColorPixels};
 
-/// Minimum standard deviation of a channel, of 255: sensor noise and compression.
-const LEAST_SIGMA: f32 = 6.0;
+/// Minimum standard deviation of a channel or of brightness, of 255: sensor noise and compression.
+pub(super) const LEAST_SIGMA: f32 = 6.0;
 /// Probability that a pixel without the body has its background color, and probability that it has any color of the surroundings
 /// instead: shadows and lamps change many pixels.
 const CHANGED: f32 = 0.5;
+/// Channels of a color.
+const CHANNELS: f32 = 3.0;
 
 /// The background colors of one camera.
 #[derive(Clone, Debug)]
@@ -51,10 +53,10 @@ impl EmptyScene {
             sum.map(|sum| (sum / count).round() as u8)
         });
         let mean: Vec<[u8; 3]> = mean.collect();
-        let variance = (squares / (3.0 * mean.len() as f64 * f64::from((count - 1.0).max(1.0)))) as f32;
+        let variance = (squares / (f64::from(CHANNELS) * mean.len() as f64 * f64::from((count - 1.0).max(1.0)))) as f32;
         let sigma = variance.sqrt().max(LEAST_SIGMA);
         let width = (std::f32::consts::TAU.sqrt() * sigma).ln();
-        let most = if gray { -width } else { (SIDE as f32).ln() * 3.0 - 3.0 * width };
+        let most = if gray { -width } else { (SIDE as f32).ln() * CHANNELS - CHANNELS * width };
         Ok(Some(Self { size: *size, gray, mean, most: most.min(0.0), narrow: 0.5 / (sigma * sigma) }))
     }
 

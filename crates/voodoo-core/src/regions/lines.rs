@@ -3,7 +3,7 @@
 use super::labels::{LimbLabels, NOTHING};
 use super::scan::LineEdge;
 use crate::body::Body;
-use crate::camera::{Camera, NEAREST_RETURN};
+use crate::camera::Camera;
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::DepthImage;
 
@@ -108,7 +108,7 @@ impl Viewer<'_> {
     fn line(&self, limb: usize, camera_from_limb: &Pose, foot: Vec3, normal: [f64; 2]) -> Option<Line> {
         let point = *camera_from_limb * foot;
         let norm = (normal[0] * normal[0] + normal[1] * normal[1]).sqrt();
-        if !(point.z > NEAREST_RETURN && norm > 0.0) {
+        if !(point.z > Camera::NEAREST && norm > 0.0) {
             return None;
         }
         let n = normal.map(|value| value / norm);

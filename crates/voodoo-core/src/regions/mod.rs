@@ -27,6 +27,7 @@ use histogram::ColorModel;
 use labels::LimbLabels;
 use lines::{Line, SAME_VIEW, Viewer};
 use pixel_gain::camera_from_limb_at;
+use posterior::MOST_REACH;
 use scan::{EdgeSearch, ScanView};
 use std::collections::BTreeMap;
 
@@ -37,8 +38,8 @@ const SEARCHES: [EdgeSearch; STEPS] = [
     EdgeSearch { reach: 6, every: 1.0 },
     EdgeSearch { reach: 5, every: 1.0 },
 ];
-/// The edge search for estimating a limb's girth.
-const SINGLE_EDGES: EdgeSearch = EdgeSearch { reach: 10, every: 1.0 };
+/// The edge search for estimating a limb's girth: as wide as one can be.
+const SINGLE_EDGES: EdgeSearch = EdgeSearch { reach: MOST_REACH, every: 1.0 };
 /// Label images are drawn in cells of two to this power pixels.
 const CELL_BITS: u32 = 1;
 /// Approximate spacing of lines along a limb, meters; and the least and greatest number of lines on each side.
@@ -111,7 +112,7 @@ pub(crate) struct Posed<'a> {
 /// let rotation = Quat::from_mat3(&Mat3::from_cols(Vec3::Y, -Vec3::Z, -Vec3::X));
 /// let world_from_sensor = Pose::from_parts(Vec3::X * 3.0, rotation);
 /// let mut rendering = Rendering::default();
-/// rendering.render(&body, &standing, &Viewpoint { camera: &camera, world_from_sensor }, None)?;
+/// rendering.render(&body, &standing, &Viewpoint { camera: &camera, world_from_sensor })?;
 /// let red_on_gray: Vec<[u8; 3]> =
 ///     rendering.limb().iter().map(|limb| if *limb == NO_LIMB { [90; 3] } else { [200, 30, 30] }).collect();
 ///

@@ -15,10 +15,10 @@ use crate::math::{Pose, Vec3, extrapolated, refill, shifted};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::picture::ColorImage;
 use crate::shape::TaperedEllipticCylinder;
-use crate::visibility::ALONG_LIMB;
+use crate::visibility::{ALONG_LIMB, across_limb};
 
 /// Sample positions across a limb, as fractions of its projected radius.
-const OVER: [f64; 5] = [-0.7, -0.35, 0.0, 0.35, 0.7];
+const OVER: [f64; 5] = across_limb(0.7);
 /// Backdrops are drawn in cells of two to this power pixels.
 const BACKDROP_BITS: u32 = 2;
 
@@ -80,7 +80,7 @@ impl ColorRegions {
     /// Writes to `supports` what every limb of the arms and legs explains that no limb outside its own arm or leg does.
     pub(crate) fn pixel_gains(&mut self, posed: Posed, chains: &[TwoBone], supports: &mut [RegionSupport]) {
         for chain in chains {
-            self.draw(posed, |limb| chain.limbs().all(|own| own != limb));
+            self.draw(posed, |limb| !chain.has(limb));
             for limb in chain.limbs() {
                 [supports[limb].gained, supports[limb].area] = self.pixel_gain(posed, limb);
             }

@@ -1,7 +1,7 @@
 //! Samples images along lines: log ratios of limb and surroundings, and colors to learn.
 
 use super::Learned;
-use super::empty_scene::EmptyScene;
+use super::empty_scene::{EmptyScene, LEAST_SIGMA};
 use super::histogram::{ColorModel, bin_of, clamped};
 use super::labels::{LimbLabels, NOTHING};
 use super::lines::{BESIDE, Line, NEARER_BY};
@@ -13,8 +13,6 @@ use crate::observation::picture::ColorImage;
 const WIDEST: f32 = 48.0;
 /// Distance from the contour within which local brightness is compared, units.
 const LOCAL: f32 = 12.0;
-/// Minimum standard deviation of brightness beside the contour, of 255.
-const LEAST_SPREAD: f32 = 6.0;
 /// Number of samples on each side that count as beside the contour.
 const NEXT_TO: usize = 5;
 /// Colors are learned from this distance inside and outside of the contour on, units.
@@ -88,7 +86,7 @@ fn log_density(values: impl Iterator<Item = f32>) -> Option<impl Fn(f32) -> f32>
         (count, sum, squares) = (count + 1.0, sum + value, squares + value * value);
     }
     let mean = sum / count;
-    let variance = (squares / count - mean * mean).max(LEAST_SPREAD * LEAST_SPREAD);
+    let variance = (squares / count - mean * mean).max(LEAST_SIGMA * LEAST_SIGMA);
     (count >= 3.0).then_some(move |value: f32| -0.5 * ((value - mean).powi(2) / variance + variance.ln()))
 }
 

@@ -19,7 +19,7 @@ pub(super) const SIGMAS: f64 = 3.5;
 /// Sum of log odds from which on a track is not a person.
 const FALSE_TRACK_ODDS: f64 = 12.0;
 /// Sum of log odds from which on a detection is confirmed as a person, or as being elsewhere than the track. No single detection
-/// of a tracked person contributes more.
+/// of a tracked person contributes more. Also the cost at which somebody confirmed is new rather than one who was here before, nats.
 pub(crate) const ENOUGH_ODDS: f64 = 4.0;
 
 /// Standard deviation of the distance between a detection and the place where the same person was tracked last, meters: of both

@@ -201,7 +201,7 @@ impl Relocalizer {
 /// floor.
 fn floor_under(detection: Detected) -> Option<Ground> {
     detection.detection.floor.filter(|floor| {
-        let above = detection.ankles().map(|ankle| floor.normal.dot(ankle.position) - floor.offset);
+        let above = detection.ankles().map(|ankle| floor.height(ankle.position));
         above.fold(f64::INFINITY, f64::min).abs() < ELSEWHERE
     })
 }

@@ -18,7 +18,7 @@ pub(super) fn try_at(context: Context, fit: &mut Fit, present: &[Pose], place: &
     let cost = |fit: &mut Fit, poses: &[Pose]| {
         fit.match_all(context, poses, context.config.max_steps, true);
         let correspondences = &fit.correspondences;
-        Objective { context, correspondences, poses, clutter: 1.0, regions: None }.body()
+        Objective { context, correspondences, poses, regions: None }.body(1.0)
     };
     let present_cost = cost(fit, present);
     refill(found, place.iter().copied());

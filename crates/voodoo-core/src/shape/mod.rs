@@ -34,7 +34,7 @@ pub(crate) use section::{FacingSection, Section};
 /// Minimum length, meters: the accuracy of the queries. A smaller value is an input error.
 pub(crate) const MIN_SIZE: f64 = 1e-6;
 /// Maximum length, meters. A larger value is an input error, most likely of units.
-pub(crate) const MAX_SIZE: f64 = 1e3;
+const MAX_SIZE: f64 = 1e3;
 /// On a rim, the normal is the direction to the query when the query is farther away than this, meters, and the mean of the two
 /// adjacent faces' normals when it is nearer.
 pub(crate) const RIM_NORMAL_DISTANCE: f64 = 1e-4;
@@ -152,6 +152,11 @@ impl TaperedEllipticCylinder {
     fn ellipse_sign(&self, q: Vec3) -> f64 {
         let (a, b) = self.semi_axes(q.z);
         (q.x * b).powi(2) + (q.y * a).powi(2) - (a * b).powi(2)
+    }
+
+    /// Growth of the semi-axes along x and y per meter of the axis.
+    pub(crate) fn growth(&self) -> [f64; 2] {
+        [(self.a1 - self.a0) / self.length, (self.b1 - self.b0) / self.length]
     }
 
     /// The largest semi-axis, meters.

@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix3;
 
-use super::girth::{GIRTH_STEPS, Girth, GirthSystem, TIP_FACTORS, follow_girth, kernel, start_girth};
+use super::girth::{GIRTH_STEPS, Girth, GirthSystem, follow_girth, kernel, start_girth};
 use crate::association::correspondence::EdgePair;
 use crate::body::{Body, Model};
 use crate::fit::{Fit, Setting};
@@ -73,7 +73,7 @@ impl ColorGirths {
                 let part = &model.body.limbs()[limb];
                 if part.match_caps[1] {
                     let longer = tip(&part.shape, edges());
-                    model.body.change_tip(limb, longer.clamp(TIP_FACTORS[0], TIP_FACTORS[1]));
+                    model.body.change_tip(limb, longer);
                 }
                 let system = system(&model.body.limbs()[limb].shape, edges());
                 start_girth(&mut self.limbs, limb, &system, 1.0, &mut model.body, &mut poses[limb]);

@@ -13,8 +13,6 @@ use crate::shape::{Section, TaperedEllipticCylinder};
 
 /// Gauss-Newton steps of the girth fit; points are matched to limbs anew in each.
 pub(super) const GIRTH_STEPS: usize = 6;
-/// Limits of the factor by which the first frame changes the length of a limb with a free tip.
-pub(super) const TIP_FACTORS: [f64; 2] = [0.8, 1.25];
 /// Standard deviation of the shift of a limb's surface relative to its joints (meters), and of its relative girth: the variation
 /// between persons, clothes and definitions of joint centers that anthropometry leaves.
 const SHIFT_SIGMA: f64 = 0.03;

@@ -5,7 +5,7 @@ pub(crate) mod girth;
 mod reported;
 
 use crate::association::contour::edges;
-use crate::body::{Body, Model, Pair};
+use crate::body::{Body, MOST_STRETCH, Model, Pair};
 use crate::config::Config;
 use crate::detect::JointMap;
 use crate::fit::{CONTOUR_FROM, Fit, Setting};
@@ -13,18 +13,16 @@ use crate::math::{Pose, Vec3};
 use crate::solver::Gate;
 use color_girth::ColorGirths;
 use girth::{
-    ALIKE, ASIDE_SIGMA, FOUND_SHARE, GIRTH_STEPS, Girth, GirthPrior, TIP_FACTORS, first_system, follow_girth,
-    side_system, start_girth,
+    ALIKE, ASIDE_SIGMA, FOUND_SHARE, GIRTH_STEPS, Girth, GirthPrior, first_system, follow_girth, side_system,
+    start_girth,
 };
 pub(crate) use reported::LengthEstimate;
 use reported::ReportedLengths;
 
 /// Points farther than this from the given pose are not used for the sizes, meters.
-const START_GATE: Gate = Gate { box_margin: 0.10, distance: 0.10 };
+const START_GATE: Gate = Gate::within(0.10);
 /// Relative standard deviation of a limb's length that no detection reported.
 pub(crate) const LENGTH_SIGMA: f64 = 0.1;
-/// Limits of the factor by which all frames together change a limb's length.
-const LENGTH_FACTORS: [f64; 2] = [0.5, 2.0];
 
 /// How a pose was set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,7 +127,7 @@ impl Sizes {
                 }
                 if let Some(tip) = edges_found.iter().find(|edge| edge.side == Vec3::Z) {
                     let longer = 1.0 + (tip.reach - tip.rim) / shape.length();
-                    model.body.change_tip(limb, longer.clamp(TIP_FACTORS[0], TIP_FACTORS[1]));
+                    model.body.change_tip(limb, longer);
                 }
                 let matches = &fit.correspondences.limbs[limb];
                 let sigma = setting.config.depth_contour_sigma;
@@ -176,9 +174,8 @@ impl Sizes {
         if !fit.lengths(setting.with_model(model), predicted, poses, pairs, pull, change) {
             return;
         }
-        let [shortest, longest] = LENGTH_FACTORS;
         for ((pair, total), change) in pairs.iter().zip(stretched).zip(change.iter()) {
-            let factor = (*total + change).clamp(shortest, longest) / *total;
+            let factor = (*total + change).clamp(1.0 / MOST_STRETCH, MOST_STRETCH) / *total;
             *total *= factor;
             pair.iter().for_each(|limb| model.body.change_length(*limb, factor));
         }

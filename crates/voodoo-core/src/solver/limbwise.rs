@@ -30,7 +30,7 @@ pub(crate) fn solve_limbwise(correspondences: &Correspondences, poses: &mut [Pos
 fn surface_moments(matches: &LimbMatches, center: Vec3) -> Moments {
     /// Sums side by side: one SIMD register of double precision, in AVX2.
     const WIDE: usize = 4;
-    let c = center.to_array().map(|value| value as f32);
+    let c = center.as_vec3().to_array();
     let (x, p) = (&matches.surface.points, &matches.measured);
     let count = matches.weight.len();
     // w, w x, w p, w p x^T

@@ -15,7 +15,7 @@ pub(crate) use limbwise::solve_limbwise;
 pub(crate) use schedule::Gate;
 pub(crate) use tree::TreeSolver;
 pub(crate) use warm_start::WarmStart;
-pub(crate) use whole_body::{OVERLAP_SIGMA, SITE_SCALE, WholeBody};
+pub(crate) use whole_body::{SITE_SCALE, WholeBody};
 
 use crate::association::correspondence::Correspondences;
 use crate::fit::Context;

@@ -22,13 +22,17 @@ pub(crate) struct Gate {
 }
 
 impl Gate {
+    /// The points up to this distance.
+    pub(crate) const fn within(distance: f64) -> Self {
+        Self { box_margin: distance, distance }
+    }
+
     /// Which points may be matched in a step of a frame.
     pub(crate) fn new(config: &Config, step: usize) -> Self {
         if !config.solver.is_whole_body() {
             return Self { box_margin: config.limb_box_margin, distance: config.max_distance };
         }
-        let distance = narrowed(config.gate_start, config.gate_end, step);
-        Self { box_margin: distance, distance }
+        Self::within(narrowed(config.gate_start, config.gate_end, step))
     }
 }
 

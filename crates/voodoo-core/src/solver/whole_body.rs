@@ -8,8 +8,6 @@ use crate::fit::Context;
 use crate::math::{Pose, Quat, Vec3, refill, reset};
 use crate::terms::{DetectedJoints, Floor, Limits, Measurements, Penetration, Posture, Prior, Rest, Term};
 
-/// Standard deviation of the depth of an axis inside another limb or below the ground, meters.
-pub(crate) const OVERLAP_SIGMA: f64 = 0.03;
 /// Scatter of the points about the body at which the still prior has its full gain, in units of `point_sigma`.
 const ROUGH: f64 = 0.35;
 /// From this step on, a remaining deviation from the prediction may be noise; in earlier steps the points are still being
@@ -89,9 +87,9 @@ impl WholeBody {
         self.last_step = step;
         let prior = Prior { stillness: &self.stillness, ..free };
         refill(&mut self.spheres, body.limbs().iter().zip(poses).map(|(limb, pose)| limb.shape.sphere(pose)));
-        let penetration = Penetration { sigma: OVERLAP_SIGMA, spheres: &self.spheres };
+        let penetration = Penetration { spheres: &self.spheres };
         let posture = Posture { fraction: config.motion_scale };
-        let floor = context.observation.floor().map(|plane| Floor { plane, sigma: OVERLAP_SIGMA });
+        let floor = context.observation.floor().map(|plane| Floor { plane });
         // The cost function: a new term is a new file and a line here.
         let detected = DetectedJoints { pairs: &correspondences.detected };
         let terms: [Option<&dyn Term>; 7] = [

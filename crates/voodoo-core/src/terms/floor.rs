@@ -1,7 +1,7 @@
 //! Keeps the ends of limbs above the ground plane. The constraint is soft, as between limbs: the given or estimated plane may
 //! have a small error.
 
-use super::{LARGEST_COST, Term};
+use super::{LARGEST_COST, OVERLAP_SIGMA, Term};
 use crate::body::Body;
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::Ground;
@@ -12,13 +12,11 @@ use crate::terms::normal_equations::{NormalEquations, line};
 pub(crate) struct Floor {
     /// The ground plane, in the frame of the poses.
     pub plane: Ground,
-    /// Standard deviation of the depth below it, meters.
-    pub sigma: f64,
 }
 
 impl Term for Floor {
     fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations) {
-        let weight = 1.0 / (self.sigma * self.sigma);
+        let weight = 1.0 / (OVERLAP_SIGMA * OVERLAP_SIGMA);
         for (index, (limb, pose)) in body.limbs().iter().zip(poses).enumerate() {
             let end = *pose * (Vec3::Z * limb.shape.length());
             let depth = -self.plane.height(end);
@@ -27,9 +25,10 @@ impl Term for Floor {
             }
         }
     }
+}
 
-    fn cost(&self, body: &Body, poses: &[Pose], limb: usize) -> f64 {
-        let end = poses[limb] * (Vec3::Z * body.limbs()[limb].shape.length());
-        (0.5 * (self.plane.height(end).min(0.0) / self.sigma).powi(2)).min(LARGEST_COST)
-    }
+/// Cost of the pose of a limb whose end is below the ground, nats.
+pub(crate) fn floor_cost(plane: Ground, body: &Body, poses: &[Pose], limb: usize) -> f64 {
+    let end = poses[limb] * (Vec3::Z * body.limbs()[limb].shape.length());
+    (0.5 * (plane.height(end).min(0.0) / OVERLAP_SIGMA).powi(2)).min(LARGEST_COST)
 }

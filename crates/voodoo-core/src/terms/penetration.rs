@@ -1,7 +1,7 @@
 //! Limbs do not pass through each other: keeps each limb's axis outside of other limbs. Surfaces may overlap, because limbs are
 //! soft, and the models are thicker than real limbs.
 
-use super::{LARGEST_COST, Term};
+use super::{LARGEST_COST, OVERLAP_SIGMA, Term};
 use crate::body::Body;
 use crate::math::{Pose, Vec3};
 use crate::terms::normal_equations::{NormalEquations, line};
@@ -15,15 +15,13 @@ const APPROXIMATE: f64 = 0.01;
 /// has the same parent. Such limbs overlap at their joints in any pose.
 #[derive(Debug)]
 pub(crate) struct Penetration<'a> {
-    /// Standard deviation of the overlap, meters.
-    pub sigma: f64,
     /// [`crate::TaperedEllipticCylinder::sphere`] of every limb: excludes most pairs, which are far apart.
     pub spheres: &'a [(Vec3, f64)],
 }
 
 impl Term for Penetration<'_> {
     fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations) {
-        let weight = 1.0 / (self.sigma * self.sigma);
+        let weight = 1.0 / (OVERLAP_SIGMA * OVERLAP_SIGMA);
         for first in 1..poses.len() {
             for second in 0..first {
                 if !overlap(self.spheres[first], self.spheres[second]) || !body.are_apart(first, second) {
@@ -41,18 +39,19 @@ impl Term for Penetration<'_> {
             }
         }
     }
+}
 
-    /// Twice the negative log-likelihood that `sigma` gives: so fitted to right and wrong poses of rendered people.
-    fn cost(&self, body: &Body, poses: &[Pose], limb: usize) -> f64 {
-        let sphere = |limb: usize| body.limbs()[limb].shape.sphere(&poses[limb]);
-        let (own, mut squares) = (sphere(limb), 0.0);
-        for other in (0..poses.len()).filter(|other| body.are_apart(limb, *other)) {
-            if overlap(own, sphere(other)) {
-                each_overlap(body, poses, [limb, other], |_, _, depth| squares += (depth / self.sigma).powi(2));
-            }
+/// Cost of the pose of a limb inside other limbs, nats: twice the negative log-likelihood that `OVERLAP_SIGMA` gives, so fitted to
+/// right and wrong poses of rendered people.
+pub(crate) fn penetration_cost(body: &Body, poses: &[Pose], limb: usize) -> f64 {
+    let sphere = |limb: usize| body.limbs()[limb].shape.sphere(&poses[limb]);
+    let (own, mut squares) = (sphere(limb), 0.0);
+    for other in (0..poses.len()).filter(|other| body.are_apart(limb, *other)) {
+        if overlap(own, sphere(other)) {
+            each_overlap(body, poses, [limb, other], |_, _, depth| squares += (depth / OVERLAP_SIGMA).powi(2));
         }
-        squares.min(LARGEST_COST)
     }
+    squares.min(LARGEST_COST)
 }
 
 /// Calls `each` with every tested point of `limb` that lies inside `other`, the normal of the surface of `other` there, and the
@@ -89,9 +88,7 @@ mod tests {
     fn an_arm_inside_the_trunk_has_a_cost_and_one_beside_it_has_none() {
         let (model, poses) = standing();
         let (body, chain) = (&model.body, &model.extremities[first_arm(&model)]);
-        let cost = |poses: &[Pose]| -> f64 {
-            chain.limbs().map(|limb| Penetration { sigma: 0.03, spheres: &[] }.cost(body, poses, limb)).sum()
-        };
+        let cost = |poses: &[Pose]| -> f64 { chain.limbs().map(|limb| penetration_cost(body, poses, limb)).sum() };
         assert_eq!(cost(&poses), 0.0);
         let mut inside = poses.clone();
         chain.reach(body, &mut inside, 0.5 * (poses[0].translation + chain.root(body, &poses)), 0.0);

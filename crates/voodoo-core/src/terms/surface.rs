@@ -250,7 +250,7 @@ mod tests {
     fn block(points: &[(Vec3, Vec3, f64, f64)], radius_variance: f64) -> LimbBlock {
         let mut matches = LimbMatches { radius_variance, ..LimbMatches::default() };
         for (foot, normal, distance, weight) in points {
-            let f32s = |v: &Vec3| v.to_array().map(|value| value as f32);
+            let f32s = |v: &Vec3| v.as_vec3().to_array();
             // Half of them are the limb's own.
             matches.weight.push(2.0 * *weight as f32);
             matches.own.push(0.5);

@@ -4,9 +4,6 @@ use super::BodyTracker;
 use crate::error::TrackError;
 use crate::math::{Pose, Vec3};
 
-/// Largest plausible speed of a site, meters per second. A faster site has jumped and is expected to stay where it is.
-const FASTEST_SITE: f64 = 8.0;
-
 /// Poses of all limbs in the last two estimates, world frame.
 ///
 /// ```
@@ -35,6 +32,11 @@ pub struct LimbMotion<'a> {
     pub interval: f64,
 }
 
+impl LimbMotion<'_> {
+    /// Largest plausible speed of a point of the body, meters per second. A faster one has jumped and is expected to stay where it is.
+    pub const FASTEST: f64 = 8.0;
+}
+
 impl BodyTracker {
     /// Returns the motion of the limbs between the last two estimates; `None` where these are unrelated, as after a reset.
     pub fn limb_motion(&self) -> Option<LimbMotion<'_>> {
@@ -60,7 +62,7 @@ impl BodyTracker {
         let elapsed = self.config.prediction * (stamp - self.estimate.stamp);
         let moved = |(place, before): (&Vec3, &Vec3)| {
             let velocity = (*place - *before) / interval;
-            if velocity.length() <= FASTEST_SITE { *place + elapsed * velocity } else { *place }
+            if velocity.length() <= LimbMotion::FASTEST { *place + elapsed * velocity } else { *place }
         };
         Ok(sites.iter().zip(&self.before.sites).map(moved).collect())
     }

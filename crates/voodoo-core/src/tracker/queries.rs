@@ -167,7 +167,7 @@ impl BodyTracker {
             let point = points.get(index);
             let found = format_args!("{:?} in row {index}", point.to_array());
             Unexpected::unless(point.is_finite(), "points", "finite meters", found)?;
-            queries.push((point - self.motion.origin).to_array().map(|value| value as f32));
+            queries.push((point - self.motion.origin).as_vec3().to_array());
         }
         Ok(queries)
     }

@@ -6,7 +6,6 @@
 
 use super::{FittedPose, MAX_SIGMA, USUAL_MOTION};
 use crate::body::kinematics::freedoms;
-use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Model};
 use crate::math::{Vec3, factor, refill, reset};
 use crate::solver::{ChainSolver, SITE_SCALE};
@@ -120,7 +119,7 @@ impl EdgeFilter {
             let support_net =
                 correspondences.region_support.get(limb).map_or(0.0, |support| support.own - support.against);
             let weight = (support_net.max(0.0) * support_net).max(MIN_WEIGHT);
-            let loose = extremities.iter().flat_map(TwoBone::limbs).all(|other| other != limb);
+            let loose = !extremities.iter().any(|chain| chain.has(limb));
             block.h *= if loose { LOOSE * weight } else { weight };
         }
         let information = config.point_information();

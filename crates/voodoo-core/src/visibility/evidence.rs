@@ -91,7 +91,7 @@ mod tests {
         let world_from_sensor = Pose::IDENTITY;
         let view = Viewpoint { camera: pinhole(WIDTH, HEIGHT, INTRINSICS), world_from_sensor };
         let mut image = Rendering::default();
-        image.render(body, poses, &view, None).unwrap();
+        image.render(body, poses, &view).unwrap();
         let millimeters = |depth: &f32| if *depth > 0.0 { (depth * 1000.0).round() as u16 } else { behind };
         image.depth().iter().map(millimeters).collect()
     }

@@ -126,8 +126,7 @@ fn support_in_view(
             if sight == PatchVisibility::FreeSpace {
                 count(&mut support.free_space);
             } else if let Some(z) = place.depth_within(EXPLAINED) {
-                let unrelated = |other: &usize| *other != limb && !chain.limbs().any(|kin| kin == *other);
-                let mut unrelated = raycasters.iter().enumerate().filter(|(other, _)| unrelated(other));
+                let mut unrelated = raycasters.iter().enumerate().filter(|(other, _)| !chain.has(*other));
                 if !unrelated.any(|(_, other)| (other.depth_before(point) - z).abs() < EXPLAINED) {
                     count(&mut support.own);
                 }

@@ -6,8 +6,6 @@
 //! equation give the root to a micrometer. Rays near a silhouette's border or along the axis of a limb, and limbs whose aspect
 //! changes much, use [`TaperedEllipticCylinder::cast_ray`], which is exact and fifty times slower.
 
-use rayon::prelude::*;
-
 use crate::body::Body;
 use crate::camera::Camera;
 use crate::error::TrackError;
@@ -19,8 +17,6 @@ use crate::shape::TaperedEllipticCylinder;
 ///
 /// [`Rendering`] has an example.
 pub const NO_LIMB: u16 = u16::MAX;
-/// Rows in one thread's unit of work: fixed, so that the work is split in the same way for any number of threads.
-const ROWS_TOGETHER: usize = LANES;
 /// Precision of predicted depths, for a depth of one meter. Bounds in the image are widened by the same amount, in units of `x /
 /// z`, to allow for rounding. A limb that comes nearer to the camera plane than this has no bounds: every ray is tested.
 const PRECISION: f64 = f32::EPSILON as f64;
@@ -67,7 +63,7 @@ impl Viewpoint<'_> {
 /// let rotation = Quat::from_mat3(&Mat3::from_cols(Vec3::Y, -Vec3::Z, -Vec3::X));
 /// let view = Viewpoint { camera: &camera, world_from_sensor: Pose::from_parts(Vec3::X * 3.0, rotation) };
 /// let mut rendering = Rendering::default();
-/// rendering.render(&body, &body.rest_pose(Pose::IDENTITY), &view, None)?;
+/// rendering.render(&body, &body.rest_pose(Pose::IDENTITY), &view)?;
 /// let chest = 80 * rendering.width() + 160;
 /// assert_eq!(usize::from(rendering.limb()[chest]), body.limb_index("thorax")?);
 /// assert!((rendering.depth()[chest] - 2.9).abs() < 0.1);
@@ -100,18 +96,11 @@ impl Rendering {
 
     /// Predicts the image that `view` observes of `body` in the poses `world_from_limb`, one per limb.
     ///
-    /// Runs on the threads of `pool`, or on the calling thread; the result is bit-identical. A limb that contains the camera is
-    /// not visible from inside. A second image of the same size allocates nothing on one thread.
+    /// A limb that contains the camera is not visible from inside. A second image of the same size allocates nothing.
     ///
     /// # Errors
     /// [`TrackError::Measurement`] when the poses or the camera cannot be used; the last image is kept then.
-    pub fn render(
-        &mut self,
-        body: &Body,
-        world_from_limb: &[Pose],
-        view: &Viewpoint,
-        pool: Option<&rayon::ThreadPool>,
-    ) -> Result<(), TrackError> {
+    pub fn render(&mut self, body: &Body, world_from_limb: &[Pose], view: &Viewpoint) -> Result<(), TrackError> {
         check_pose("world_from_sensor", &view.world_from_sensor)?;
         check_poses(body, world_from_limb)?;
         let Self { width, depth, limb, raycasters } = self;
@@ -119,21 +108,11 @@ impl Rendering {
         reset(depth, view.camera.pixels(), 0.0);
         reset(limb, view.camera.pixels(), NO_LIMB);
         refill(raycasters, LimbRaycaster::of_body(body, world_from_limb, view.world_from_sensor));
-        let raycasters = &*raycasters;
-        let size = view.camera.width() * ROWS_TOGETHER;
-        let work = |(band, (depth, limb)): (usize, (&mut [f32], &mut [u16]))| {
-            vectorized!({
-                for (index, raycaster) in (0..).zip(raycasters) {
-                    raycaster.fill(view, band * ROWS_TOGETHER, index, depth, limb);
-                }
-            });
-        };
-        match pool {
-            Some(pool) => pool.install(|| {
-                depth.par_chunks_mut(size).zip(limb.par_chunks_mut(size)).enumerate().for_each(work);
-            }),
-            None => depth.chunks_mut(size).zip(limb.chunks_mut(size)).enumerate().for_each(work),
-        }
+        vectorized!({
+            for (index, raycaster) in (0..).zip(&*raycasters) {
+                raycaster.fill(view, index, depth, limb);
+            }
+        });
         Ok(())
     }
 }
@@ -250,12 +229,11 @@ impl LimbRaycaster {
         (start, end.max(start))
     }
 
-    /// Renders the limb where it is nearest, in a band of rows that starts at row `top`.
+    /// Renders the limb where it is nearest.
     #[inline(always)]
-    fn fill(&self, view: &Viewpoint, top: usize, index: u16, depth: &mut [f32], limb: &mut [u16]) {
+    fn fill(&self, view: &Viewpoint, index: u16, depth: &mut [f32], limb: &mut [u16]) {
         let width = view.camera.width();
-        for (offset, (depth, limb)) in depth.chunks_mut(width).zip(limb.chunks_mut(width)).enumerate() {
-            let row = top + offset;
+        for (row, (depth, limb)) in depth.chunks_mut(width).zip(limb.chunks_mut(width)).enumerate() {
             let (first, end) = self.span(view.camera, row);
             for start in (first..end).step_by(LANES) {
                 let (x, y) = view.lanes(row, start);
@@ -303,7 +281,7 @@ impl LimbRaycaster {
         let d = self.axes[0] * x + self.axes[1] * y + self.axes[2];
         let length = self.shape.length();
         let (a0, b0) = (self.shape.a0(), self.shape.b0());
-        let (da, db) = ((self.shape.a1() - a0) / length, (self.shape.b1() - b0) / length);
+        let [da, db] = self.shape.growth();
         let inside = |z: f64| select(z < 0.0, 0.0, select(z > length, length, z));
         // Intersections with the planes of the caps.
         let (one, other) = (-o.z / d.z, (length - o.z) / d.z);

@@ -36,7 +36,7 @@ fn rendered(body: Option<(&Body, &[Pose])>, camera: usize) -> Rendering {
     let view = Viewpoint { camera: &CAMERA, world_from_sensor };
     let mut rendering = Rendering::default();
     if let Some((body, poses)) = body {
-        rendering.render(body, poses, &view, None).unwrap();
+        rendering.render(body, poses, &view).unwrap();
     }
     rendering
 }

@@ -38,7 +38,7 @@ fn arms(body: &Body) -> Vec<TwoBone> {
 fn shoot(body: &Body, poses: &[Pose], world_from_sensor: Pose) -> Vec<u16> {
     let view = Viewpoint { camera: scene::pinhole(WIDTH, HEIGHT, INTRINSICS), world_from_sensor };
     let mut image = Rendering::default();
-    image.render(body, poses, &view, None).unwrap();
+    image.render(body, poses, &view).unwrap();
     image.depth().iter().map(|depth| (depth * 1000.0).round() as u16).collect()
 }
 

@@ -10,7 +10,7 @@ use voodoo_core::math::{Mat3, Pose, Quat, Vec3, rotation_vector};
 use voodoo_core::observation::frame::Ground;
 use voodoo_core::terms::normal_equations::NormalEquations;
 use voodoo_core::terms::{
-    DetectedJoints, Edges, Floor, Limits, Penetration, Posture, Prior, Rest, Sites, Surface, Term,
+    DetectedJoints, Edges, Floor, Limits, Penetration, Posture, Prior, Rest, Sites, Surface, Term, floor_cost,
 };
 use voodoo_core::{Body, Joint};
 
@@ -226,10 +226,18 @@ proptest! {
         poses[forearm] = poses[thorax] * Pose::new(Vec3::new(0.05, 0.12, 0.1), Vec3::new(folded, 0.4, 0.0));
         let add = |poses: &[Pose], normal: &mut NormalEquations| {
             let spheres: Vec<_> = body.limbs().iter().zip(poses).map(|(limb, pose)| limb.shape.sphere(pose)).collect();
-            Penetration { sigma: 1.0, spheres: &spheres }.add(&body, poses, normal);
+            Penetration { spheres: &spheres }.add(&body, poses, normal);
         };
-        let term = Penetration { sigma: 1.0, spheres: &[] };
-        check(&body, &poses, &add, &|poses| (0..poses.len()).map(|limb| term.cost(&body, poses, limb)).sum())?;
+        let cost = |poses: &[Pose]| {
+            let pairs = (0..poses.len()).flat_map(|limb| (0..poses.len()).map(move |other| [limb, other]));
+            let overlap = |[limb, other]: [usize; 2]| [0.0, 0.35, 0.7, 1.0].map(|fraction| {
+                let place = poses[limb] * (fraction * body.limbs()[limb].shape.length() * Vec3::Z);
+                let found = body.limbs()[other].shape.closest_point(poses[other].inverse_transform_point(place));
+                (found.signed_distance.min(0.0) / 0.03).powi(2)
+            }).iter().sum::<f64>();
+            pairs.filter(|[limb, other]| body.are_apart(*limb, *other)).map(overlap).sum()
+        };
+        check(&body, &poses, &add, &cost)?;
         let mut normal = NormalEquations::default();
         normal.clear(poses.len());
         add(&poses, &mut normal);
@@ -242,8 +250,9 @@ proptest! {
         let poses = random_pose(&body, &angles);
         // The middle of the body is in the floor: some limbs end above it, some below.
         let normal = Vec3::new(tilt.sin(), 0.0, tilt.cos());
-        let term = Floor { plane: Ground { normal, offset: normal.dot(poses[0].translation) }, sigma: 1.0 };
-        let cost = |poses: &[Pose]| (0..poses.len()).map(|limb| 2.0 * term.cost(&body, poses, limb)).sum();
+        let term = Floor { plane: Ground { normal, offset: normal.dot(poses[0].translation) } };
+        let depth = |pose: &Pose, length: f64| (term.plane.height(*pose * (Vec3::Z * length)).min(0.0) / 0.03).powi(2);
+        let cost = |poses: &[Pose]| body.limbs().iter().zip(poses).map(|(limb, pose)| depth(pose, limb.shape.length())).sum();
         check(&body, &poses, &|poses, normal| term.add(&body, poses, normal), &cost)?;
         let mut system = NormalEquations::default();
         system.clear(poses.len());
@@ -253,7 +262,8 @@ proptest! {
             let push = system.limbs[limb].g;
             // What is above feels nothing.
             prop_assert_eq!(height < 0.0, push.norm() > 0.0);
-            prop_assert!((term.cost(&body, &poses, limb) - 0.5 * height.min(0.0).powi(2)).abs() < 1e-12);
+            let expected = (0.5 * depth(&poses[limb], part.shape.length())).min(10.0);
+            prop_assert!((floor_cost(term.plane, &body, &poses, limb) - expected).abs() < 1e-12);
         }
     }
 

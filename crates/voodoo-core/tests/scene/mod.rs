@@ -136,7 +136,7 @@ impl DepthCamera {
     pub(crate) fn shoot(&self, body: &Body, poses: &[Pose], sigma: f64, noise: &mut Noise) -> (Vec<u16>, usize) {
         let view = Viewpoint { camera: self.camera(), world_from_sensor: Self::world_from_sensor() };
         let mut image = Rendering::default();
-        image.render(body, poses, &view, None).unwrap();
+        image.render(body, poses, &view).unwrap();
         let visible = image.limb().iter().filter(|limb| **limb != NO_LIMB).count();
         let measured = |depth: &f32| {
             let depth = if *depth > 0.0 { f64::from(*depth) } else { 3.6 };

@@ -24,6 +24,9 @@ const LEAST_FALL: f64 = 1e-3;
 /// Number of steps without such a fall after which the image has converged.
 const STALLED_STEPS: usize = 3;
 
+/// Damping divided by the squared residual with which each level starts.
+const FIRST_TRUST: f64 = 0.1;
+
 /// Solver parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolverOptions {
@@ -246,7 +249,7 @@ impl IkSolver {
             self.levels.ranges.push(start..start + same.len());
         }
         let count = self.levels.ranges.len();
-        reset(&mut self.levels.trust, count, 0.1);
+        reset(&mut self.levels.trust, count, FIRST_TRUST);
         reset(&mut self.levels.before, count, 0.0);
         for vector in [&mut self.linear.part, &mut self.here.gradient, &mut self.trial.gradient, &mut self.trial_angles]
         {
@@ -286,7 +289,7 @@ impl IkSolver {
             let by = if at_limit { NUDGE_AT_LIMIT } else { NUDGE } * (1.0 + 0.37 * (i % 3) as f64);
             *angle = if *high - *angle < *angle - *low { *angle - by } else { *angle + by }.clamp(*low, *high);
         }
-        self.levels.trust.fill(0.1);
+        self.levels.trust.fill(FIRST_TRUST);
         self.evaluate_here(problem, angles);
     }
 

@@ -7,8 +7,8 @@ use voodoo_core::math::refill;
 
 /// Allowed rise of the image criterion, pixels: rounding.
 const LEVEL: f64 = 1e-9;
-/// Fractions of a step that are tried in order.
-const FRACTIONS: [f64; 4] = [1.0, 0.25, 0.0625, 0.015_625];
+/// Number of lengths of a step that are tried in order, each a quarter of the one before.
+const TRIED_LENGTHS: i32 = 4;
 
 impl IkSolver {
     /// Takes steps towards the rest posture, each corrected by the goals. A step that makes a goal or the images worse is
@@ -39,7 +39,7 @@ impl IkSolver {
             if largest(&self.stages[(count + 1) * n..]) < problem.options.still {
                 return 0.0;
             }
-            for fraction in FRACTIONS {
+            for fraction in (0..TRIED_LENGTHS).map(|power| 0.25_f64.powi(power)) {
                 for (i, [low, high]) in limits.iter().enumerate() {
                     angles[i] = (self.phase_start[i] + fraction * self.stages[(count + 1) * n + i]).clamp(*low, *high);
                 }

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 use crate::eye::Eye;
+use crate::registration::FEWEST_POINTS;
 use crate::skin::colors::SkinColors;
 use crate::skin::depth::DepthBeside;
 use crate::skin::regions::{opened, regions, smoothed};
@@ -32,11 +33,9 @@ const FROM_ELBOW: (f64, f64) = (0.6, 0.2);
 const ON_LIMB: f32 = 0.05;
 /// See [`ON_LIMB`].
 const OFF_ARM: f32 = 0.03;
-/// The body is within this distance of the predicted sites along the optical axis, meters.
-const BODY_ROOM: f64 = 0.4;
-/// Enlargement of the part of the image that is searched around the predicted joints, meters.
+/// The body is searched for within this distance of the predicted joints, in the image and along the optical axis, meters.
 const SEARCHED: f64 = 0.4;
-/// The same for the part whose colors are learned as surroundings.
+/// Enlargement around them of the part of the image whose colors are learned as surroundings, meters.
 const LEARNED: f64 = 0.2;
 /// Colors are learned within this fraction of a face's radius, and none as surroundings within that many of any site's radius.
 const TAUGHT: (f64, f64) = (0.8, 2.5);
@@ -179,7 +178,7 @@ impl SkinCue {
         if !(nearest.is_finite() && farthest.is_finite()) {
             return Ok(Vec::new());
         }
-        let ranges = self.segment(input, [nearest - BODY_ROOM, farthest + BODY_ROOM]);
+        let ranges = self.segment(input, [nearest - SEARCHED, farthest + SEARCHED]);
         self.find_candidates(input, &sites, &ranges, PALM * input.eye.focal() / nearest);
         let costs = self.costs(input, &sites)?;
         let mut found = Vec::new();
@@ -240,7 +239,8 @@ impl SkinCue {
                     .collect();
                 near.sort_unstable_by(f64::total_cmp);
                 let direction = input.eye.direction(pixel);
-                let range = (near.len() >= 3).then(|| near[near.len() / 2] / direction.dot(input.eye.axis()));
+                let range =
+                    (near.len() >= FEWEST_POINTS).then(|| near[near.len() / 2] / direction.dot(input.eye.axis()));
                 let surface = range.map(|range| input.eye.origin() + range * direction);
                 if direction.is_finite() {
                     found.push(SkinCandidate { pixel, region, area, only, direction, surface });

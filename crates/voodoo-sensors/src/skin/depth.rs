@@ -1,10 +1,8 @@
 //! Looks up the depth of a color camera's pixels in the image of a depth camera beside it.
 
 use crate::eye::Eye;
+use crate::registration::ONE_SURFACE;
 use voodoo_core::DepthPixels;
-
-/// Two depths within this are of one surface, meters.
-const SAME: f64 = 0.1;
 
 /// A depth image beside a color camera.
 #[derive(Clone, Copy, Debug)]
@@ -22,11 +20,11 @@ impl DepthBeside<'_> {
     /// depth that is expected.
     pub(super) fn at(&self, color: &Eye, ray: [f64; 2], z: f64) -> Option<f64> {
         let first = self.depth_at(color, ray, z)?;
-        if (first - z).abs() < SAME {
+        if (first - z).abs() < ONE_SURFACE {
             return Some(first);
         }
         // The two cameras see what is farther or nearer at another offset.
-        self.depth_at(color, ray, first).filter(|second| (second - first).abs() < SAME)
+        self.depth_at(color, ray, first).filter(|second| (second - first).abs() < ONE_SURFACE)
     }
 
     /// Depth of what the depth camera sees where this ray has the depth `z`.

@@ -2,7 +2,7 @@
 
 use crate::body::Body;
 use crate::hypotheses::ROUGH_SAMPLE;
-use crate::math::{Points, Pose, reset, widest};
+use crate::math::{Points, Pose, reset, vectorized};
 use crate::observation::candidates::Candidates;
 use crate::visibility::EXPLAINED;
 
@@ -45,17 +45,14 @@ impl Exclusive {
             limb.shape.approximate_distances(pose, sample, distances);
             distances.iter_mut().for_each(|distance| *distance = distance.abs());
             let own = nearest.iter_mut().zip(&mut *least).zip(&mut *near).zip(&*distances);
-            widest(
-                #[inline(always)]
-                || {
-                    for (((nearest, least), near), distance) in own {
-                        let nearer = *distance < *least;
-                        *nearest = if nearer { index } else { *nearest };
-                        *least = if nearer { *distance } else { *least };
-                        *near += u32::from(*distance <= EXPLAINED as f32);
-                    }
-                },
-            );
+            vectorized!({
+                for (((nearest, least), near), distance) in own {
+                    let nearer = *distance < *least;
+                    *nearest = if nearer { index } else { *nearest };
+                    *least = if nearer { *distance } else { *least };
+                    *near += u32::from(*distance <= EXPLAINED as f32);
+                }
+            });
             all.extend_from_slice(distances);
         }
         for place in 0..sample.len() {

@@ -235,7 +235,7 @@ impl Assessor {
         let Self { limbs, supports, .. } = self;
         let (model, origin) = (context.model, context.observation.origin());
         for (limb, filter) in limbs.iter_mut().enumerate() {
-            if model.extremities.iter().all(|chain| chain.limbs().all(|own| own != limb)) {
+            if !model.extremities.iter().any(|chain| chain.has(limb)) {
                 filter.observe([filter.evidence; 2], 0.0, 0.0);
             }
         }
