@@ -225,12 +225,14 @@ ANY_ARRAY = arrays.arrays(
 )
 
 
+@pytest.mark.filterwarnings("ignore::voodoo.UnitWarning")
 @FAST
 @given(ANY_ARRAY, st.floats(), st.floats())
 def test_any_array_is_tracked_or_refused_and_no_nan_comes_out(array, stamp, weight):
     tracked(array, array, stamp, weight)
 
 
+@pytest.mark.filterwarnings("ignore::voodoo.UnitWarning")
 def test_any_numbers_in_arrays_of_the_right_form_are_tracked_or_refused_and_no_nan_comes_out():
     rows, near = st.tuples(st.integers(0, 30), st.just(3)), st.floats(-2.0, 2.0, width=32)
     share = share_taken(

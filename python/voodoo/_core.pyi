@@ -34,6 +34,7 @@ __all__ = [
     "config_fields",
     "euler_angles",
     "expected_sites",
+    "implausible_depth",
     "linear_sum_assignment",
     "nearest_surface",
     "people_text",
