@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyMappingProxy, PyTuple};
 use pythonize::{depythonize, pythonize};
 use voodoo_core::math::{Mat3, Vec3};
-use voodoo_core::{Body, Estimate, Limb};
+use voodoo_core::{Body, Estimate, Limb, Status};
 
 use crate::arrays::{Array, frozen, matrices};
 use crate::errors::MeasurementError;
@@ -38,19 +38,25 @@ pub struct PyEstimate {
     pub sources: Vec<String>,
 }
 
-/// Values by name; none of what has no name.
-fn mapping<'py, T: IntoPyObject<'py>>(
-    py: Python<'py>,
-    names: &Py<PyTuple>,
-    values: impl IntoIterator<Item = T>,
-) -> PyResult<Bound<'py, PyMappingProxy>> {
-    let named = names.bind(py).iter().zip(values).filter(|(name, _)| !name.is_none());
-    Ok(PyMappingProxy::new(py, named.into_py_dict(py)?.as_mapping()))
-}
+impl PyEstimate {
+    /// Values by name; none of what has no name. Without a pose it is empty, and a name that is looked up is told so.
+    fn mapping<'py, T: IntoPyObject<'py>>(
+        &self,
+        py: Python<'py>,
+        names: &Py<PyTuple>,
+        values: impl IntoIterator<Item = T>,
+    ) -> PyResult<Bound<'py, PyMappingProxy>> {
+        if self.estimate.status == Status::Searching {
+            return Ok(PyMappingProxy::new(py, py.import("voodoo.errors")?.getattr("NO_POSE")?.cast()?));
+        }
+        let named = names.bind(py).iter().zip(values).filter(|(name, _)| !name.is_none());
+        Ok(PyMappingProxy::new(py, named.into_py_dict(py)?.as_mapping()))
+    }
 
-/// The rows of one array by name, as views, which are cheaper than separate arrays.
-fn rows<'py>(names: &Py<PyTuple>, all: &Array<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-    mapping(all.py(), names, all.try_iter()?.collect::<PyResult<Vec<_>>>()?)
+    /// The rows of one array by name, as views, which are cheaper than separate arrays.
+    fn rows<'py>(&self, names: &Py<PyTuple>, all: &Array<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        self.mapping(all.py(), names, all.try_iter()?.collect::<PyResult<Vec<_>>>()?)
+    }
 }
 
 /// The arguments of [`_estimate`]: the estimate as plain Python, and the names of limbs, sites, joints and sources.
@@ -87,13 +93,13 @@ impl PyEstimate {
     #[doc = stub!("Estimate.limb_status")]
     #[getter]
     fn limb_status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        mapping(py, &self.names.limbs, self.estimate.limb_status.iter().map(|status| status.name()))
+        self.mapping(py, &self.names.limbs, self.estimate.limb_status.iter().map(|status| status.name()))
     }
 
     #[doc = stub!("Estimate.limb_probability")]
     #[getter]
     fn limb_probability<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        mapping(py, &self.names.limbs, self.estimate.limb_probability.iter())
+        self.mapping(py, &self.names.limbs, self.estimate.limb_probability.iter())
     }
 
     #[doc = stub!("Estimate.steps")]
@@ -142,19 +148,19 @@ impl PyEstimate {
     #[doc = stub!("Estimate.joints")]
     #[getter]
     fn joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        rows(&self.names.sites, &self.joint_positions(py)?)
+        self.rows(&self.names.sites, &self.joint_positions(py)?)
     }
 
     #[doc = stub!("Estimate.world_from_limb")]
     #[getter]
     fn world_from_limb<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        rows(&self.names.limbs, &self.limb_poses(py)?)
+        self.rows(&self.names.limbs, &self.limb_poses(py)?)
     }
 
     #[doc = stub!("Estimate.covariance")]
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        rows(&self.names.sites, &self.joint_covariances(py)?)
+        self.rows(&self.names.sites, &self.joint_covariances(py)?)
     }
 
     #[doc = stub!("Estimate.joint_covariances")]
@@ -169,7 +175,7 @@ impl PyEstimate {
     fn joint_sigma<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let sites = &self.estimate.covariances.sites;
         let sigma = sites.iter().flat_map(|covariance| (0..3).map(|axis| covariance.col(axis)[axis].sqrt()));
-        rows(&self.names.sites, &frozen(py, sigma.collect(), &[sites.len(), 3])?)
+        self.rows(&self.names.sites, &frozen(py, sigma.collect(), &[sites.len(), 3])?)
     }
 
     #[doc = stub!("Estimate.limb_covariance")]
@@ -177,7 +183,7 @@ impl PyEstimate {
     fn limb_covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let limbs = &self.estimate.covariances.limbs;
         let all = limbs.iter().flatten().flatten().copied().collect();
-        rows(&self.names.limbs, &frozen(py, all, &[limbs.len(), 6, 6])?)
+        self.rows(&self.names.limbs, &frozen(py, all, &[limbs.len(), 6, 6])?)
     }
 
     #[doc = stub!("Estimate.root_covariance")]
@@ -193,37 +199,37 @@ impl PyEstimate {
         let turns = &self.estimate.covariances.turns;
         // Symmetric: columns are rows.
         let all = turns.iter().flat_map(Mat3::to_cols_array).collect();
-        rows(&self.names.joints, &frozen(py, all, &[turns.len(), 3, 3])?)
+        self.rows(&self.names.joints, &frozen(py, all, &[turns.len(), 3, 3])?)
     }
 
     #[doc = stub!("Estimate.length_sigma")]
     #[getter]
     fn length_sigma<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        mapping(py, &self.names.limbs, self.estimate.covariances.lengths.iter().copied())
+        self.mapping(py, &self.names.limbs, self.estimate.covariances.lengths.iter().copied())
     }
 
     #[doc = stub!("Estimate.girth_sigma")]
     #[getter]
     fn girth_sigma<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        mapping(py, &self.names.limbs, self.estimate.covariances.girths.iter().copied())
+        self.mapping(py, &self.names.limbs, self.estimate.covariances.girths.iter().copied())
     }
 
     #[doc = stub!("Estimate.limb_points")]
     #[getter]
     fn limb_points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        mapping(py, &self.names.limbs, self.estimate.limb_points.iter().copied())
+        self.mapping(py, &self.names.limbs, self.estimate.limb_points.iter().copied())
     }
 
     #[doc = stub!("Estimate.limb_residual")]
     #[getter]
     fn limb_residual<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        mapping(py, &self.names.limbs, self.estimate.limb_residual.iter().copied())
+        self.mapping(py, &self.names.limbs, self.estimate.limb_residual.iter().copied())
     }
 
     #[doc = stub!("Estimate.joint_gaps")]
     #[getter]
     fn joint_gaps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        mapping(py, &self.names.joints, self.estimate.joint_gaps.iter().copied())
+        self.mapping(py, &self.names.joints, self.estimate.joint_gaps.iter().copied())
     }
 
     #[doc = stub!("Estimate.sources")]
