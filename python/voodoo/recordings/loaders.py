@@ -163,6 +163,7 @@ def guess_loader(path: Path) -> str:
         try:
             return "ros1" if find_bag(path).suffix.lower() in ROS1_SUFFIXES else "ros2"
         except RecordingError as error:
+            _refuse_keypoints_alone(path)
             raise RecordingError(f"{error}; {_listing()}") from error
     advice = _ADVICE.get(path.suffix.lower())
     if advice is not None:
@@ -187,6 +188,25 @@ def _of_cameras(path: Path) -> str | None:
     if sources:
         calibration_of(path, [source.stem for source in sources])
     return "videos" if sources else None
+
+
+def _refuse_keypoints_alone(path: Path) -> None:
+    """Raise an error if a folder has keypoint files and nothing that says what they are of.
+
+    Raises:
+        RecordingError: it names what a folder of keypoints needs.
+    """
+    from voodoo.recordings.pose2sim import calibration_of, keypoint_folders
+
+    folders = keypoint_folders(path)
+    if folders:
+        calibration_of(path, [folder.name.removesuffix("_json") for folder in folders])
+    if any(path.glob("*_json")) or any(file.name != "init.json" for file in path.glob("*.json")):
+        raise RecordingError(
+            f"{path}: expected a recording, found keypoint files alone; several calibrated cameras need a folder with Calib*.toml "
+            "and keypoints/CAMERA_json/*.json, and one camera with depth is a recording of its own: voodoo track RECORDING "
+            "--keypoints SENSOR=DIR"
+        )
 
 
 def _listing() -> str:
