@@ -46,7 +46,9 @@ def test_keypoints_without_a_calibration_are_told_what_is_missing(tmp_path, comm
     (camera / "cam01_0000.json").write_text('{"people": []}')
     done = run(command, path)
     assert done.exit_code == 1
-    assert done.stderr.startswith(f"voodoo: {path}: expected one Calib*.toml, the calibration of the cameras, found none")
+    assert done.stderr.startswith(
+        f"voodoo: {path}: expected one Calib*.toml, the calibration of the cameras, found none"
+    )
     _, _, template = done.stderr.partition("\n\n")
     (path / "Calib.toml").write_text(template)
     assert [one.name for one in read_camera_toml(path / "Calib.toml")] == ["cam01"]
