@@ -52,6 +52,12 @@ class NoPoseError(VoodooError):
     """Nothing in a recording could be used, or nobody was found in it."""
 
 
+class MissingPoseError(NoPoseError, KeyError):
+    """A name was looked up in an estimate without a pose, whose mappings are empty: the tracker is searching."""
+
+    __str__ = Exception.__str__  # a KeyError's is the quoted message
+
+
 class DetectorWarning(UserWarning):
     """A detector failed, and the tracker's step continued without it. The warning names the exception."""
 

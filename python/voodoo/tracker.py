@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,9 +13,41 @@ import voodoo._core as _core
 from voodoo._core import Estimate, Frame, TaperedEllipticCylinder
 from voodoo.config import Config
 from voodoo.detectors.base import AnyDetector
-from voodoo.errors import BodyError, ConfigError, MeasurementError, of_kind, one_thread
+from voodoo.errors import BodyError, ConfigError, MeasurementError, MissingPoseError, of_kind, one_thread
 from voodoo.model.body import Body, Joint, checked_joints, ordered_poses
 from voodoo.model.joint import number_of
+from voodoo.names import SEARCHING
+
+
+class _Searching(dict[str, Any]):
+    """What an estimate without a pose has of joints and limbs: nothing, and it says so."""
+
+    def __missing__(self, name: str) -> Any:  # noqa: ANN401 - nothing is returned
+        raise MissingPoseError(
+            f"{name!r}: expected an estimate with a pose, found one with the status {SEARCHING!r}: no person was found "
+            "yet, or the person has left; check estimate.status first"
+        )
+
+
+_NO_POSE = MappingProxyType(_Searching())
+
+
+def _says_if_searching(plain: Any) -> property:  # noqa: ANN401 - a property of the core
+    """A mapping by names of joints or limbs that, where there is no pose, says so instead of doubting the name."""
+
+    def read(estimate: Estimate) -> Any:  # noqa: ANN401 - a mapping
+        found = plain.__get__(estimate)
+        return found if found or estimate.status != SEARCHING else _NO_POSE
+
+    return property(read, doc=plain.__doc__)
+
+
+for _name in (
+    *("joints", "covariance", "joint_sigma", "joint_gaps", "angle_covariance"),
+    *("world_from_limb", "limb_status", "limb_probability", "limb_covariance", "limb_points", "limb_residual"),
+    *("length_sigma", "girth_sigma"),
+):
+    setattr(Estimate, _name, _says_if_searching(vars(Estimate)[_name]))
 
 
 class RegionLines(NamedTuple):
