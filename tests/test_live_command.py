@@ -209,7 +209,7 @@ def test_signals_finish_files(tmp_path, number):
 @pytest.mark.parametrize(
     ("words", "messages"),
     [
-        (["nowhere"], "found no such file"),
+        (["nowhere"], "expected a recording, realsense, oak, orbbec, ros2:TOPIC or grow:FOLDER, found no such file"),
         (["ros2:,"], "ros2:TOPIC"),
         (
             ["ros2:/depth", "--topic", "depth=/depth"],

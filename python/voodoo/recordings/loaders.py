@@ -189,6 +189,8 @@ def guess_loader(path: Path) -> str:
             return "ros1" if find_bag(path).suffix.lower() in ROS1_SUFFIXES else "ros2"
         except RecordingError as error:
             _refuse_keypoints_alone(path)
+            if not any(path.iterdir()):
+                raise RecordingError(f"{path}: expected a recording, found an empty folder; {_listing()}") from error
             raise RecordingError(f"{error}; {_listing()}") from error
     advice = _ADVICE.get(path.suffix.lower())
     if advice is not None:
@@ -226,7 +228,7 @@ def _refuse_keypoints_alone(path: Path) -> None:
     folders = keypoint_folders(path)
     if folders:
         calibration_of(path, [folder.name.removesuffix("_json") for folder in folders])
-    if any(path.glob("*_json")) or any(file.name != "init.json" for file in path.glob("*.json")):
+    if any(path.glob("*_json")) or any(path.glob("*_keypoints.json")) or path.resolve().name.endswith("_json"):
         raise RecordingError(
             f"{path}: expected a recording, found keypoint files alone; several calibrated cameras need a folder of "
             "Calib*.toml and keypoints/CAMERA_json/*.json, and one camera with depth is a recording of its own: "
