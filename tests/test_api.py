@@ -469,3 +469,20 @@ def test_every_error_is_a_voodoo_error_and_a_value_error():
 def test_the_package_is_imported_quietly():
     run = subprocess.run([sys.executable, "-c", "import voodoo"], capture_output=True, text=True, check=True)
     assert run.stdout == run.stderr == ""
+
+
+def test_an_estimate_without_a_pose_says_so(tracker, body, cloud):
+    searching = voodoo.Tracker(body).estimate
+    assert not searching.joints and dict(searching.joints) == {} and searching.joints.get("l_wrist") is None
+    of_names = [name for name in dir(searching) if isinstance(getattr(searching, name), Mapping) and name != "sources"]
+    assert len(of_names) == 13
+    for name in of_names:
+        with pytest.raises(
+            VoodooError, match=r"^'l_wrist': expected an estimate with a pose, found .*status 'searching'"
+        ):
+            getattr(searching, name)["l_wrist"]
+        with pytest.raises(KeyError):
+            getattr(pickle.loads(pickle.dumps(searching)), name)["l_wrist"]
+    posed = tracker.step(frame_of(cloud))
+    with pytest.raises(KeyError, match=r"^'wrist'$"):
+        posed.joints["wrist"]

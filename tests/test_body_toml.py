@@ -105,6 +105,22 @@ def test_names_of_any_kind_survive():
         ("length = 0.2", "length = inf", ["limbs.base.shape.length", "finite"]),
         ("length = 0.2, ", "", ["limbs.base.shape.length", "found none"]),
         ("length = 0.2", "length = 5e9", ["limbs.base.shape", "length"]),
+        (
+            "length = 0.2",
+            "length = 200.0",
+            ["limbs.base.shape.length", "meters, 30 at most", "200 millimeters are 0.2"],
+        ),
+        ("a0 = 0.1, b0", "a0 = 100, b0", ["limbs.base.shape.a0", "meters, 30 at most", "found 100"]),
+        (
+            "semi_axes = [0.02, 0]",
+            "limits = [[-90, 90], [0, 0], [0, 0]]",
+            ["limbs.arm.joint.limits", "radians", "-90 degrees are -1.571"],
+        ),
+        (
+            "position = [0, 0, 0.2]",
+            "position = [0, 0, 0.2], rotation = [45, 0, 0]",
+            ["limbs.arm.joint.on_parent.rotation", "radians", "found 45"],
+        ),
         ("a0 = 0.1, b0 = 0.1, a1 = 0.08", "a0 = 0.0, b0 = 0.1, a1 = 0.0", ["limbs.base.shape", "a0 and a1", "flat"]),
         ('parent = "base"', 'parent = "leg"', ["limbs.arm.parent", "base", "leg"]),
         ('parent = "base"\n', "", ["limbs.arm", "both a parent and a joint"]),
@@ -129,6 +145,13 @@ def test_every_error_names_its_key(old, new, words):
         voodoo.Body.from_toml(THING.replace(old, new), source="thing.toml")
     message = str(caught.value)
     assert message.startswith("thing.toml: ") and all(word in message for word in words), message
+
+
+def test_a_crane_and_a_full_turn_are_bodies():
+    text = THING.replace("length = 0.2", "length = 29.0")
+    text = text.replace("semi_axes = [0.02, 0]", f"limits = [[-6.2832, {2.0 * np.pi}], [0, 0], [0, 0]]")
+    assert "29.0" in text and "6.2832" in text
+    assert voodoo.Body.from_toml(text).limbs[0].shape.length == 29.0
 
 
 def test_unreadable_files_are_named(tmp_path):

@@ -32,7 +32,7 @@ from voodoo.export.human_frames import frame_places, frame_plan
 from voodoo.export.layout import rows_of
 from voodoo.export.skeleton import skeleton
 from voodoo.export.track import Track
-from voodoo.export.upright import by_axes, by_feet, by_floor, lying_words, turned
+from voodoo.export.upright import Turn, by_axes, by_feet, by_floor, lying_words, turned
 from voodoo.pipeline.run import start_tracker
 from voodoo.pipeline.run import track as run_track
 from voodoo.recordings import sample_path
@@ -307,6 +307,25 @@ def test_a_body_that_lies_or_floats_is_doubted(tracked):
     high = replace(track, joints=track.joints + (0.0, 0.0, 4.0))
     assert "above the floor, z = 0 of odom" in lying_words(high, "odom")
     assert lying_words(high, "world") == ""  # nobody says that its z = 0 is the floor
+
+
+@pytest.mark.parametrize(
+    ("words", "roll"),
+    [
+        ("90 degrees clockwise", [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+        ("90 degrees counterclockwise", [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+        ("180 degrees", [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]]),
+    ],
+)
+def test_turned_images_are_named_and_their_results_put_upright(tracked, words, roll):
+    track, _ = tracked
+    camera = seen_by_a_camera(track)
+    picture = turned(camera, Turn(np.pad(roll, (0, 1)) + np.diag([0.0, 0.0, 0.0, 1.0]), "of another camera"))
+    assert f"are the images turned by {words}?" in lying_words(picture, "oak_optical_frame")
+    turn = by_feet([picture], "oak_optical_frame")
+    assert lying_words(picture, "oak_optical_frame", turn) == ""
+    level = turned(picture, turn).joints - turned(camera, by_feet([camera], "oak_optical_frame")).joints
+    np.testing.assert_allclose(level[..., 2], 0.0, atol=1e-9)
 
 
 def test_a_floor_or_feet_level_a_leaning_frame(tracked):

@@ -6,10 +6,11 @@ import pytest
 import typer.main
 from typer.testing import CliRunner
 
+from commands import refused, run
 from voodoo.cli import app
 from voodoo.errors import VoodooError
 from voodoo.live.sources.words import source_of
-from voodoo.recordings import sample_path
+from voodoo.recordings import open_recording, sample_path
 from voodoo.recordings.keypoint_layouts import LAYOUTS
 
 COMMANDS = typer.main.get_command(app).commands
@@ -61,3 +62,36 @@ def test_an_option_of_reading_is_never_ignored(words, option, reason, tmp_path: 
 def test_a_live_source_takes_no_option_that_it_does_not_know(word):
     with pytest.raises(VoodooError, match="depth_topic"):
         source_of(word, options={"depth_topic": "/other"})
+
+
+@pytest.mark.parametrize(
+    ("option", "for_", "instead"),
+    [
+        ("--topic depth=/front", "loader ros2, ros1", "its options: calibration, rate"),
+        ("--frame odom", "loader ros2, ros1", "use root_frame in calibration.toml"),
+        (
+            "--option meters_per_unit=0.001",
+            "loader ros2, ros1, pose2sim, videos",
+            "use depth_factor in calibration.toml",
+        ),
+        ("--option unpacked_gb=1", "loader ros2, ros1", "its options: calibration, rate"),
+    ],
+)
+def test_an_option_of_bags_says_so_of_a_folder(option, for_, instead, tmp_path):
+    path = tmp_path / "room"
+    (path / "depth").mkdir(parents=True)
+    for command in ("track", "info"):
+        done = run(command, path, *option.split())
+        refused(done, f"({option.split()[0]} ", for_, "found one of the loader folder", instead)
+
+
+def test_an_option_of_folders_says_so_of_a_bag():
+    words = "rate (--option rate=NUMBER): expected a recording it is for (loader folder, pose2sim, videos)"
+    refused(run("track", sample_path(), "--option", "rate=15"), words, "found one of the loader ros2")
+
+
+def test_an_option_that_no_loader_has_is_answered_with_those_there_are():
+    with pytest.raises(
+        VoodooError, match=r"expected an option of the loader ros2 \(use, depth_topic.*, found depth_topics$"
+    ):
+        open_recording(sample_path(), depth_topics="/front")

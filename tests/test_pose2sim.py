@@ -38,6 +38,47 @@ def test_camera_toml(tmp_path):
         read_camera_toml(path)
 
 
+@pytest.mark.parametrize("command", ["info", "track"])
+def test_keypoints_without_a_calibration_are_told_what_is_missing(tmp_path, command):
+    path = tmp_path / "walk"
+    camera = path / "keypoints" / "cam01_json"
+    camera.mkdir(parents=True)
+    (camera / "cam01_0000.json").write_text('{"people": []}')
+    done = run(command, path)
+    assert done.exit_code == 1
+    assert done.stderr.startswith(
+        f"voodoo: {path}: expected one Calib*.toml, the calibration of the cameras, found none"
+    )
+    _, _, template = done.stderr.partition("\n\n")
+    (path / "Calib.toml").write_text(template)
+    assert [one.name for one in read_camera_toml(path / "Calib.toml")] == ["cam01"]
+    (path / "Calib.toml").unlink()
+    for alone in (path / "keypoints", camera):
+        refused(run(command, alone), "found keypoint files alone", "Calib*.toml and keypoints/CAMERA_json/*.json")
+    (tmp_path / "settings.json").write_text("{}")
+    refused(run(command, tmp_path), "expected a ROS bag")
+
+
+def test_another_number_of_files_names_the_cameras(tmp_path):
+    for camera, count in (("left", 2), ("right", 0)):
+        folder = tmp_path / "keypoints" / f"{camera}_json"
+        folder.mkdir(parents=True)
+        for number in range(count):
+            (folder / f"{number}.json").write_text('{"people": []}')
+    tables = [
+        CALIBRATION.partition("[metadata]")[0],
+        CALIBRATION.partition("[metadata]")[0].replace("cam_01", "cam_02"),
+    ]
+    (tmp_path / "Calib.toml").write_text(tables[0] + tables[1].replace('"left"', '"right"'))
+    refused(
+        run("info", tmp_path), "expected as many keypoint files for every camera", "found left_json 2, right_json 0"
+    )
+
+
+def test_an_empty_folder_is_called_so(tmp_path):
+    refused(run("info", tmp_path), f"{tmp_path}: expected a recording, found an empty folder; loaders: ros2")
+
+
 @pytest.mark.parametrize("program", ["anipose", "caliscope", "kalibr", "opencv"])
 def test_calibrations_of_other_programs(tmp_path, program):
     turn = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]

@@ -18,6 +18,8 @@ from test_exports import with_gaps
 from voodoo.export.people import PeopleTrack
 from voodoo.export.track import Track
 from voodoo.recordings import sample_path
+from voodoo.visualization import image_writer
+from voodoo.visualization.report_page import playable
 
 pytest.importorskip("plotly", reason="pip install plotly, of the extra report")
 PLAY = """<script>setTimeout(() => {
@@ -70,10 +72,39 @@ def test_the_film_goes_with_the_timeline_and_angles_have_deviations(tmp_path):
     assert done.exit_code == 0, done.stderr
     page = (tmp_path / "r.html").read_text(encoding="utf-8")
     (width, duration, at, bands), console = told_by(page + FILM, tmp_path)
-    assert width == cv2.VideoCapture(str(film)).get(cv2.CAP_PROP_FRAME_WIDTH) and console == []
+    assert 800 < width < cv2.VideoCapture(str(film)).get(cv2.CAP_PROP_FRAME_WIDTH) and console == []
     assert duration == pytest.approx(len(track) / 30.0, abs=0.2) and 0.1 < at <= duration
     assert bands == len(track.angle_names) and "Left out: nothing" in page
     refused(run("report", result, "--film", result, "--out", tmp_path / "none.html"), "expected a video")
+
+
+def test_a_film_in_a_page_is_small_and_still_shows_the_picture(tmp_path):
+    pytest.importorskip("av", reason="pip install av, of the extra film")
+    film, shown = tmp_path / "look.mp4", tmp_path / "film.webm"
+    assert run("track", sample_path(), "--out", tmp_path / "pose.csv", "--overlay", film).exit_code == 0
+    shown.write_bytes(playable(film))
+    assert shown.stat().st_size < 90 * 6_000  # a page of 300 frames has 8 MB then, of which Plotly has 5
+    first, small = cv2.VideoCapture(str(film)), cv2.VideoCapture(str(shown))
+    for _ in range(90):
+        (there, picture), (also, found) = first.read(), small.read()
+        assert there and also
+        size = found.shape[1::-1]
+        assert size[0] * size[1] <= 600_000 and size[0] / size[1] == pytest.approx(1840 / 720, rel=0.01)
+        assert cv2.PSNR(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), found) > 32.0
+    assert not small.read()[0]
+
+
+@pytest.mark.parametrize("encoder", ["PyAV", "OpenCV"])
+def test_a_film_of_any_size_is_made_playable(tmp_path, monkeypatch, encoder):
+    if encoder == "OpenCV":
+        monkeypatch.setattr(image_writer, "_SMALL", {"none": {}})
+    color_scene.write_video(tmp_path / "look.avi", [np.full((50, 66, 3), 90, np.uint8)] * 3)
+    (tmp_path / "film.webm").write_bytes(playable(tmp_path / "look.avi"))
+    shown = cv2.VideoCapture(str(tmp_path / "film.webm"))
+    assert shown.read()[1].shape == (50, 66, 3) and shown.get(cv2.CAP_PROP_FPS) == pytest.approx(30.0)
+    track_of(voodoo.Body.human()).save(tmp_path / "pose.npz")
+    done = run("report", tmp_path / "pose.npz", "--film", tmp_path / "look.avi", "--out", tmp_path / "a.html")
+    assert done.exit_code == 0 and ("voodoo-tracker[film]" in done.stderr) == (encoder == "OpenCV")
 
 
 def test_what_is_no_result_leaves_no_page(tmp_path):
@@ -98,4 +129,5 @@ def test_a_film_that_opencv_cannot_read_or_write_is_an_error_that_names_it(tmp_p
             self.isOpened = self.write = self.release = lambda *_: False
 
     monkeypatch.setattr("cv2.VideoWriter", Closed)
+    monkeypatch.setattr(image_writer, "_SMALL", {"none": {}})
     refused(run("report", result, "--film", tmp_path / "look.avi", "--out", tmp_path / "a.html"), "look.avi", "VP8")

@@ -499,7 +499,7 @@ def test_live_sends_to_several_receivers_at_once(tmp_path, receiver):
     told = json.loads(report.read_text())
     late = told["late_outputs"][f"vmc://127.0.0.1:{receiver.port}"]
     assert told["late_outputs"].keys() >= {"ws://:0"}
-    assert 20 < len(hips) <= told["tracked"] - late
+    assert 20 < len(hips) <= told["processed"] - late
     track = Track.load(tmp_path / "pose.npz")
     forward, left, up = track.joints[track.found][-1, track.joint_names.index("humanoid_root")]
     np.testing.assert_allclose(hips[-1][1:4], (-left, up, forward), atol=0.12)  # between hips and pelvis

@@ -281,3 +281,42 @@ def test_a_table_of_an_evaluation_that_fails_leaves_the_old_one(tmp_path, monkey
     with pytest.raises(OSError, match=r"sequences\.csv"):
         write_sequences(table, [])
     assert table.read_text() == "old"
+
+
+WRITTEN = [
+    ("track", "--overlay", "look.mp4"),
+    ("track", "--save", "look.rrd"),
+    ("live", "--report", "r.json"),
+    ("live", "--record", "take.mcap"),
+    ("init", "--out", "start.json"),
+    ("eval", "--out", "report"),
+    ("report", "--out", "page.html"),
+]
+
+
+@pytest.mark.parametrize(("command", "option", "name"), WRITTEN)
+def test_an_output_that_cannot_be_written_is_refused_before_the_work(command, option, name, tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("")
+    words = [command, str(sample_path()) if command == "eval" else str(tmp_path / "nowhere"), option]
+    refused(run(app, [*words, str(tmp_path / "file" / name)]), f"file/{name}: expected a folder that can be written to")
+    monkeypatch.setattr("os.access", lambda _, mode, **__: mode != os.W_OK)
+    refused(run(app, [*words, str(tmp_path / name)]), f"{name}: expected a folder that can be written to")
+
+
+def test_an_output_of_another_kind_is_refused_before_the_work(tmp_path):
+    (tmp_path / "file").write_text("")
+    refused(
+        run(app, ["eval", str(sample_path()), "--out", str(tmp_path / "file")]), "file: expected a folder, found a file"
+    )
+    for command, option in (("live", "--report"), ("live", "--record"), ("report", "--out"), ("track", "--save")):
+        refused(run(app, [command, "nowhere", option, str(tmp_path)]), "expected a file, found a folder")
+
+
+def test_an_error_of_a_hidden_folder_names_the_output(tmp_path, monkeypatch):
+    def failing(**how):
+        raise PermissionError(errno.EACCES, "denied", str(how["dir"] / (how["prefix"] + "x")))
+
+    monkeypatch.setattr("tempfile.mkdtemp", failing)
+    with pytest.raises(PermissionError) as caught:
+        Hidden(tmp_path / "take.mcap")
+    assert caught.value.filename == str(tmp_path / "take.mcap")

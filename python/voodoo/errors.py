@@ -52,6 +52,24 @@ class NoPoseError(VoodooError):
     """Nothing in a recording could be used, or nobody was found in it."""
 
 
+class MissingPoseError(NoPoseError, KeyError):
+    """A name was looked up in an estimate without a pose, whose mappings are empty: the tracker is searching."""
+
+    __str__ = Exception.__str__  # a KeyError's is the quoted message
+
+
+class _NoPose(dict[str, Any]):
+    def __missing__(self, name: str) -> Any:  # noqa: ANN401 - nothing is returned
+        raise MissingPoseError(
+            f"{name!r}: expected an estimate with a pose, found one with the status 'searching': no person was found "
+            "yet, or the person has left; check estimate.status first"
+        )
+
+
+NO_POSE = _NoPose()
+"""What an estimate without a pose has by names of joints and limbs: nothing, and it says so."""
+
+
 class DetectorWarning(UserWarning):
     """A detector failed, and the tracker's step continued without it. The warning names the exception."""
 

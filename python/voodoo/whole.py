@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Container, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from voodoo.errors import VoodooError
 
@@ -42,7 +42,12 @@ class Hidden:
 
     def __init__(self, path: Path) -> None:
         """Make the folder, and that of the output."""
-        path.parent.mkdir(parents=True, exist_ok=True)
+        with naming(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._make(path)
+        _open.add(self.folder)
+
+    def _make(self, path: Path) -> None:
         start = f".{path.name[:_LONGEST]}-"
         for left in path.parent.iterdir():
             with suppress(OSError):
@@ -56,7 +61,6 @@ class Hidden:
                 self._lock = locked(self.folder)
             except OSError:
                 self._lock = _UNLOCKED if self.folder.exists() else None
-        _open.add(self.folder)
 
     def keep(self, **note: Any) -> None:  # noqa: ANN401 - any values of JSON
         """Keep the folder after a crash; `note` tells what is in it."""
@@ -212,6 +216,20 @@ def _sync(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def check_place(path: Path, *, kind: Literal["file", "folder", "either"] = "either") -> None:
+    """Reject an output that cannot be written, before the work starts.
+
+    Raises:
+        VoodooError: it exists as another kind, or is in a place where nothing can be written.
+    """
+    if (path.exists() and kind == "folder" and not path.is_dir()) or (kind == "file" and path.is_dir()):
+        raise VoodooError(f"{path}: expected a {kind}, found a {'file' if kind == 'folder' else 'folder'}")
+    own = [path.absolute()] if kind == "folder" else []
+    above = next(place for place in (*own, *path.absolute().parents) if place.exists())
+    if not above.is_dir() or not os.access(above, os.W_OK):
+        raise VoodooError(f"{path}: expected a folder that can be written to, found {above}")
 
 
 def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path | None], *, numbered: Container[str] = ()) -> None:

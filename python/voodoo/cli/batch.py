@@ -70,7 +70,7 @@ def batch_command(
     from voodoo.batch.task import Settings
     from voodoo.cli.running import config_of, kinds_of, limit_of
     from voodoo.errors import NoPoseError, VoodooError
-    from voodoo.whole import check_outputs
+    from voodoo.whole import check_outputs, check_place
 
     with reporting(as_json) as reported:
         settings = Settings(
@@ -87,6 +87,7 @@ def batch_command(
         sources = find_sources(recordings, only=only or ())
         if is_local(out):
             check_outputs([local_path(out)], map(local_path, filter(is_local, sources)))
+            check_place(local_path(out), kind="folder")
         check_installed()
         place = out if "://" in out else str(local_path(out).absolute())
         batch = Batch(sources, place, settings, limit_s=time_limit, report=pages)

@@ -72,7 +72,7 @@ def eval_command(
     from voodoo.evaluation.score import Score
     from voodoo.evaluation.search import find_recordings
     from voodoo.evaluation.summary import summarize
-    from voodoo.whole import check_outputs
+    from voodoo.whole import check_outputs, check_place
 
     only_depth = depth_only or None
     refuse_both("--depth-only", only_depth, **{"--use": use})
@@ -84,6 +84,7 @@ def eval_command(
         paths = find_recordings(recordings, only=only or ())
         if out is not None:
             check_outputs([out], paths)
+            check_place(out, kind="folder")
         if result is not None:
             if len(paths) != 1:
                 raise typer.BadParameter(f"--result is the result of one recording, found {len(paths)}")

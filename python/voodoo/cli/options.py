@@ -15,7 +15,7 @@ from voodoo.cli.common import refuse_both
 from voodoo.errors import VoodooError
 from voodoo.names import INPUTS, OLDEST, TOPIC_KINDS, Automatic, HumanModel
 from voodoo.recordings.keypoint_layouts import LAYOUTS
-from voodoo.recordings.loaders import LOADERS
+from voodoo.recordings.loaders import LOADERS, NUMBERS
 
 TOPICS = (*TOPIC_KINDS, "camera_info")
 """Kinds for which a topic can be chosen."""
@@ -78,9 +78,6 @@ StrictOption = Annotated[
         "--strict", help="Reject a damaged recording; by default unusable measurements are left out and counted."
     ),
 ]
-NUMBERS = ("rate", "meters_per_unit", "tf_max_age", "unpacked_gb", "seconds_per_unit")
-"""Options of loaders that are numbers."""
-
 KeypointsOption = Annotated[
     list[str] | None,
     typer.Option(

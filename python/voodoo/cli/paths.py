@@ -17,6 +17,8 @@ OUTPUTS = {"out", "overlay", "save", "report", "record"}
 """Parameters of commands that name what is written; all others with a metavar of files are read."""
 SEARCHED = "RECORDING..."
 """Metavar of folders in which recordings are searched for: the command checks the recordings that it finds."""
+_EITHER = ("DIR|FILE.mp4", "FILE")
+"""Metavar of outputs that are files or folders."""
 _BESIDE = ("truth.csv", "truth_people.csv")
 """Files that are read with a recording in their folder or the one below."""
 _FILES = re.compile(r"\b(RECORDING|SOURCE|FILE|DIR|PATH)\b")
@@ -34,24 +36,29 @@ class Checked(TyperCommand):
 
 
 def check_paths(context: typer.Context, default: Sequence[Path] = ()) -> None:
-    """Reject outputs of a command that would replace its inputs or each other.
+    """Reject outputs of a command that would replace its inputs or each other, or cannot be written.
 
     Args:
         context: of the command.
         default: outputs that no option names.
 
     Raises:
-        VoodooError: see `voodoo.whole.check_outputs`.
+        VoodooError: see `voodoo.whole.check_outputs` and `check_place`.
     """
-    from voodoo.whole import check_outputs
+    from voodoo.whole import check_outputs, check_place
 
-    outputs, inputs = list(default), []
+    outputs, inputs, places = list(default), [], []
     for option in context.command.params:
         if option.name is not None and option.metavar != SEARCHED and _FILES.search(option.metavar or ""):
             value = context.params.get(option.name)
             words = [str(one) for one in (value if isinstance(value, list | tuple) else [value]) if one is not None]
             if option.name in OUTPUTS:
-                outputs += [Path(word) for word in words if "://" not in word]
+                found = [Path(word) for word in words if "://" not in word]
+                # Commands check folders themselves, when they know what they read.
+                places += [
+                    (path, option.metavar or "") for path in found if option.metavar != "DIR" and str(path) != "-"
+                ]
+                outputs += found
             else:
                 # Also the path in SENSOR=DIR and KIND:SOURCE.
                 inputs += [Path(part) for word in words for part in (word, *re.split("[=:]", word, maxsplit=1)[1:])]
@@ -64,3 +71,5 @@ def check_paths(context: typer.Context, default: Sequence[Path] = ()) -> None:
 
         numbered = ONE_PERSON
     check_outputs(outputs, inputs, numbered=numbered)
+    for path, metavar in places:
+        check_place(path, kind="either" if metavar in _EITHER else "file")

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from voodoo.cli.common import print_message
 from voodoo.errors import VoodooError
 
 
@@ -28,6 +29,7 @@ def report_command(
     voodoo report pose.npz --film look.mp4 --out report.html
     """
     from voodoo.export.people import PeopleTrack
+    from voodoo.visualization.image_writer import NOT_SMALL, codec_for_small_films
     from voodoo.visualization.report_page import report_page
     from voodoo.whole import write_whole
 
@@ -37,3 +39,5 @@ def report_command(
     tracks = {f"person {number}": people.unbroken(number) for number in people.tracks}
     write_whole(out, report_page(result.stem, tracks, film=film))
     typer.echo(f"wrote {out}")
+    if film is not None and codec_for_small_films() is None:
+        print_message(NOT_SMALL)

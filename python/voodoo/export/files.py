@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import sys
 import tempfile
@@ -21,6 +20,7 @@ from voodoo.export.table import SUFFIXES
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, upright
 from voodoo.model.body import Body
+from voodoo.whole import check_place
 
 ONE_PERSON: Mapping[str, Callable[[Path, Track, Body], None]] = {
     ".bvh": write_bvh,
@@ -56,9 +56,7 @@ def check_target(path: Path) -> None:
         raise VoodooError(f"{path}: expected a new folder for a ROS 2 bag, found one that exists")
     if path.is_dir():
         raise VoodooError(f"{path}: expected a file, found a folder")
-    above = next(folder for folder in path.absolute().parents if folder.exists())
-    if not above.is_dir() or not os.access(above, os.W_OK):
-        raise VoodooError(f"{path}: expected a folder that can be written to, found {above}")
+    check_place(path)
 
 
 def is_folder(path: Path) -> bool:

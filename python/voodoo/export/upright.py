@@ -20,6 +20,8 @@ UPRIGHT_FROM_OPTICAL = axes("z -x -y")
 """Rotation from the axes of an optical frame (x right, y down, z forward) to those of REP-103 (x forward, y left, z up)."""
 _ANKLE_M = 0.08
 """Height of the ankle of a standing foot."""
+_TURNED = {"-Y": "90 degrees clockwise", "+Y": "90 degrees counterclockwise", "-Z": "180 degrees"}
+"""Axis along which a body stands that is seen by a level camera -> how its images are turned."""
 SUFFIX = "_upright"
 """Ends the name of the frame with z up."""
 
@@ -66,16 +68,16 @@ def by_floor(floor: tuple[FloatArray, float], *, optical: bool) -> Turn:
 
 
 def by_feet(tracks: Sequence[Track], root_frame: str, *, optical: bool | None = None) -> Turn:
-    """Without a floor that is seen: by the optical axes, else the axis along which bodies stand, with the feet on z = 0."""
+    """Without a floor that is seen: by the optical axes, and the axis along which bodies stand, with the feet on z = 0."""
     turn = by_axes(root_frame, optical=optical)
-    if not turn.words:
-        axes = [standing_along(track.joint_names, track.joints) for track in tracks]
-        axis = next((axis for axis in axes if axis), "+Z")
-        turn = Turn(turn.pose.copy(), f"by {axis} of {root_frame}, along which the body stands")
-        turn.pose[:3, :3] = Z_UP_FROM[axis]
+    tried = [upright(track, root_frame, turn) for track in tracks]
+    standing = [(standing_along(track.joint_names, track.joints), frame) for track, frame in tried]
+    axis, frame = next((found for found in standing if found[0]), ("+Z", root_frame))
+    if axis != "+Z" or not turn.words:
+        turn = Turn(pose_of(Z_UP_FROM[axis]) @ turn.pose, f"by {axis} of {frame}, along which the body stands")
     heights = [low for track in tracks for low in _ankles(turned(track, turn))]
     if heights:
-        turn.pose[2, 3] = _ANKLE_M - float(np.median(heights))
+        turn.pose[2, 3] += _ANKLE_M - float(np.median(heights))
     return Turn(turn.pose, f"{turn.words}; the feet are on z = 0")
 
 
@@ -84,8 +86,13 @@ def lying_words(track: Track, root_frame: str, turn: Turn | None = None) -> str:
     standing, frame = upright(track, root_frame, turn)
     along = standing_along(standing.joint_names, standing.joints)
     if along not in ("", "+Z"):
-        frames = "are images stamped with an optical frame, and its transform right?"
-        return f"the body stands along {along} of {frame}, whose z axis should point up; {frames}"
+        causes = "are images turned, are they stamped with an optical frame, and is its transform right?"
+        if along in _TURNED and frame != root_frame:
+            causes = (
+                f"are the images turned by {_TURNED[along]}? voodoo track --upright turns results; transforms, or "
+                "root_from_sensor in a calibration.toml, say how a camera is mounted"
+            )
+        return f"the body stands along {along} of {frame}, whose z axis should point up; {causes}"
     low = _ankles(standing)
     if frame in LEVEL_FRAMES and low.size and float(np.min(low)) > HIGH_M:
         return f"the feet are {np.min(low):.1f} m and more above the floor, z = 0 of {frame}; are the transforms right?"

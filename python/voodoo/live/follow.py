@@ -65,6 +65,11 @@ class Step:
         there = tuple(Person(number, one) for number, one in self.estimates.items() if one.joints)
         return PeopleEstimate(self.stamp, there)
 
+    @property
+    def with_pose(self) -> bool:
+        """Whether somebody is present."""
+        return bool(self.people.persons)
+
 
 class Follower:
     """Tracks one person or several through live frames.

@@ -146,6 +146,7 @@ class Session:
     Attributes:
         latency: time from measurement to published pose.
         tracking: duration of a step of the tracker.
+        tracked: number of steps with a person.
         published: number of published steps.
         with_pose: number of published steps with a person.
     """
@@ -156,7 +157,7 @@ class Session:
         """Start the stages."""
         self.live = live
         self.latency, self.tracking = Latencies(), Latencies()
-        self.published = self.with_pose = self.refused = 0
+        self.tracked = self.published = self.with_pose = self.refused = 0
         self._make, self._upright = follower, Upright(live)
         self._is_reset = threading.Event()
         self._choices: deque[tuple[str, FloatArray]] = deque(maxlen=1)
@@ -188,6 +189,7 @@ class Session:
                 step = self._step(follower, frame)
                 if step is not None:
                     self.tracking.add(step.seconds)
+                    self.tracked += step.with_pose
                     step = replace(step, turn=self._upright.of(step))
                     for lane in self._lanes:
                         lane.box.put(step)
@@ -223,7 +225,7 @@ class Session:
         now = self.live.clock.now()
         self.latency.add(now - step.frame.taken)
         self.published += 1
-        self.with_pose += any(one.status != "searching" for one in step.estimates.values())
+        self.with_pose += step.with_pose
         self._times.append(now)
         self._first = now if self._first is None else self._first
         self._last = step
@@ -312,7 +314,8 @@ class Session:
             "latency_from": self.latency_from,
             "tracking_ms": _milliseconds(self.tracking),
             "received": self.live.received,
-            "tracked": self.tracking.count,
+            "processed": self.tracking.count,
+            "tracked": self.tracked,
             "published": self.published,
             "with_pose": self.with_pose,
             "dropped": self.dropped,

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, get_args
 
 import numpy.typing as npt
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 import voodoo._core as _core
 from voodoo._core import TaperedEllipticCylinder
@@ -106,7 +106,7 @@ class Body:
             BodyError: names the key, what was expected and what was found.
         """
         values = parse_toml(text, source=source, error=BodyError)
-        with valid(source, BodyError, values):
+        with valid(source, BodyError, values, most=5):  # a wrong unit is wrong everywhere
             spec = _BodySpec.model_validate(values)
         limbs = []
         for limb in spec.limbs:
@@ -202,12 +202,28 @@ def ordered_poses(body: Body, world_from_limb: Mapping[str, npt.ArrayLike]) -> l
     return [world_from_limb[name] for name in names]
 
 
+_LONGEST_M = 30.0
+"""A longer limb is out of the range of depth cameras and most lasers; one of 3 cm in millimeters is as long."""
+
+
+def _meters(size: float) -> float:
+    if size > _LONGEST_M:
+        raise ValueError(
+            f"expected meters, {_LONGEST_M:g} at most, found {size:g}; {size:g} millimeters are {size / 1000:g}"
+        )
+    return size
+
+
+_Size = Annotated[float, Field(ge=0.0, allow_inf_nan=False), AfterValidator(_meters)]
+_Length = Annotated[float, Field(gt=0.0, allow_inf_nan=False), AfterValidator(_meters)]
+
+
 class _ShapeSpec(Strict):
-    length: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-    a0: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-    b0: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-    a1: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-    b1: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+    length: _Length
+    a0: _Size
+    b0: _Size
+    a1: _Size
+    b1: _Size
 
 
 class _LimbSpec(Strict):

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from voodoo.errors import BodyError, VoodooError, shortened
 
@@ -17,6 +18,18 @@ Number = Annotated[float, Field(allow_inf_nan=False)]
 Vector = tuple[Number, Number, Number]
 Range = tuple[Number, Number]
 _ZERO = (0.0, 0.0, 0.0)
+_FULL_TURN = 6.3
+"""Radians, typed with two digits: no component of a rotation vector needs more, and most angles in degrees are more."""
+
+
+def _radians(angles: Any) -> Any:  # noqa: ANN401 - numbers, nested as a field has them, or None
+    for angle in [] if angles is None else np.ravel(angles).tolist():
+        if abs(angle) > _FULL_TURN:
+            turn = math.radians(angle)
+            raise ValueError(
+                f"expected radians, a full turn at most, found {angle:g}; {angle:g} degrees are {turn:.4g}"
+            )
+    return angles
 
 
 @contextmanager
@@ -66,11 +79,13 @@ class Place(_Part):
     """Pose of a joint's ellipse on a limb: `position` [m] and `rotation`, a rotation vector [rad], in the limb's frame.
 
     Raises:
-        BodyError: not three finite numbers each.
+        BodyError: not three finite numbers each, or an angle of more than a full turn.
     """
 
     position: Vector = _ZERO
     rotation: Vector = _ZERO
+
+    _in_radians = field_validator("rotation")(_radians)
 
 
 class Joint(_Part):
@@ -97,6 +112,8 @@ class Joint(_Part):
     weight: Number = 1.0
     limits: tuple[Range, Range, Range] | None = None
     motion: Number = 0.3
+
+    _in_radians = field_validator("limits")(_radians)
 
     def parts(self) -> tuple[Any, ...]:
         """The joint in the format of the core."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,12 +27,14 @@ class Loader:
         name: name of the opener in it.
         expects: description of the files.
         suffixes: ends of their names, in lower case; () for folders.
+        elsewhere: option of other loaders -> what says the same of these recordings.
     """
 
     module: str
     name: str
     expects: str
     suffixes: tuple[str, ...] = ()
+    elsewhere: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def open(self) -> Callable[..., Recording]:
@@ -54,6 +56,10 @@ LOADERS: dict[str, Loader] = {
         "folder",
         "FolderRecording",
         "a folder with depth images (depth/*.png in the TUM RGB-D layout, or *.png) and calibration.toml",
+        elsewhere={
+            "root_frame": "root_frame in calibration.toml",
+            "meters_per_unit": "depth_factor in calibration.toml",
+        },
     ),
     "pose2sim": Loader("pose2sim", "Pose2SimRecording", "a folder of Pose2Sim: Calib*.toml and keypoints/*_json"),
     "videos": Loader(
@@ -67,6 +73,13 @@ LOADERS: dict[str, Loader] = {
 SUFFIXES = (".zip", *(suffix for loader in LOADERS.values() for suffix in loader.suffixes))
 """Ends of the names of files that are recordings, in lower case."""
 
+
+NUMBERS = ("rate", "meters_per_unit", "tf_max_age", "unpacked_gb", "seconds_per_unit")
+"""Options of loaders that are numbers."""
+_COMMAND_LINE = {"root_frame": "--frame NAME", "layout": "--layout NAME", "background": "--background DIR"} | {
+    name: f"--option {name}=NUMBER" for name in NUMBERS
+}
+"""Options of loaders, but for topics, as they are on the command line."""
 
 _FILM = ("a film", "depth, or a folder with the films of several cameras and their calibration, Calib*.toml")
 _ADVICE = {
@@ -114,8 +127,7 @@ def open_recording(
         options["left_out"] = left_out
     unknown = sorted(set(options) - set(known))
     if unknown:
-        allowed = ", ".join(word for word in known if word not in ("bare", "left_out")) or "none"
-        raise RecordingError(f"loader {name!r} has no option {', '.join(unknown)}; its options: {allowed}")
+        raise RecordingError(_unknown_words(path, name, unknown[0]))
     recording = LOADERS[name].open(path, **options)
     if recording.loader != name:  # the bag determines which of the two kinds it is
         raise RecordingError(
@@ -127,6 +139,19 @@ def open_recording(
 def options_of(name: str) -> tuple[str, ...]:
     """Names of the options that a loader takes."""
     return tuple(inspect.signature(LOADERS[name].open).parameters)[1:]
+
+
+def _unknown_words(path: Path, loader: str, option: str) -> str:
+    """Why a loader does not take an option: what the option is for, and what says the same of this recording."""
+    takers = [name for name in LOADERS if option in options_of(name)]
+    own = ", ".join(name for name in options_of(loader) if name not in ("bare", "left_out")) or "none"
+    if not takers:
+        return f"{path}: expected an option of the loader {loader} ({own}), found {option}"
+    topic = f"--topic {option.removesuffix('_topic')}=NAME" if option.endswith("_topic") else ""
+    words = f"{option} ({topic or _COMMAND_LINE.get(option, 'Python only')}): expected a recording it is for"
+    instead = LOADERS[loader].elsewhere.get(option)
+    advice = f"use {instead}" if instead else f"its options: {own}"
+    return f"{path}: {words} (loader {', '.join(takers)}), found one of the loader {loader}; {advice}"
 
 
 def guess_loader(path: Path) -> str:
@@ -163,6 +188,9 @@ def guess_loader(path: Path) -> str:
         try:
             return "ros1" if find_bag(path).suffix.lower() in ROS1_SUFFIXES else "ros2"
         except RecordingError as error:
+            _refuse_keypoints_alone(path)
+            if not any(path.iterdir()):
+                raise RecordingError(f"{path}: expected a recording, found an empty folder; {_listing()}") from error
             raise RecordingError(f"{error}; {_listing()}") from error
     advice = _ADVICE.get(path.suffix.lower())
     if advice is not None:
@@ -187,6 +215,25 @@ def _of_cameras(path: Path) -> str | None:
     if sources:
         calibration_of(path, [source.stem for source in sources])
     return "videos" if sources else None
+
+
+def _refuse_keypoints_alone(path: Path) -> None:
+    """Raise an error if a folder has keypoint files and nothing that says what they are of.
+
+    Raises:
+        RecordingError: it names what a folder of keypoints needs.
+    """
+    from voodoo.recordings.pose2sim import calibration_of, keypoint_folders
+
+    folders = keypoint_folders(path)
+    if folders:
+        calibration_of(path, [folder.name.removesuffix("_json") for folder in folders])
+    if any(path.glob("*_json")) or any(path.glob("*_keypoints.json")) or path.resolve().name.endswith("_json"):
+        raise RecordingError(
+            f"{path}: expected a recording, found keypoint files alone; several calibrated cameras need a folder of "
+            "Calib*.toml and keypoints/CAMERA_json/*.json, and one camera with depth is a recording of its own: "
+            "voodoo track RECORDING --keypoints SENSOR=DIR"
+        )
 
 
 def _listing() -> str:

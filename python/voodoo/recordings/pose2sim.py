@@ -189,8 +189,9 @@ def _rows_of(path: Path, folders: Sequence[Path]) -> tuple[list[tuple[Path | Non
     union = sorted({number for each in numbers for number in each})
     common = len(numbers) == len(files) and len(union) <= _MOST_MISSING * max(counts, default=0)
     if counts == {0} or (len(counts) > 1 and not common):
+        found = ", ".join(f"{folder.name} {len(own)}" for folder, own in zip(folders, files, strict=True))
         raise RecordingError(
-            f"{path}: expected as many keypoint files for every camera, or numbers in their names, found {sorted(counts)} files"
+            f"{path}: expected as many keypoint files for every camera, or numbers in their names, found {found} files"
         )
     gapless = all(max(each) - min(each) + 1 == len(each) for each in numbers if each)
     differ = any(each != numbers[0] for each in numbers)

@@ -5,6 +5,7 @@ Plotly is an optional extra: `pip install 'voodoo-tracker[report]'`.
 
 from __future__ import annotations
 
+import math
 from base64 import b64encode
 from collections import Counter
 from collections.abc import Mapping
@@ -15,12 +16,14 @@ from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
-from voodoo.errors import VoodooError, installed
+from voodoo.errors import VoodooError, installed, naming
 from voodoo.export.skeleton import mean_interval
 from voodoo.export.track import Track
 from voodoo.measurements import ASSUMED_RATE_HZ, FloatArray
 from voodoo.recordings.videos import opened_video
+from voodoo.visualization.image_writer import small_film
 
 _LINES = (
     ("humanoid_root", "vc7", "skullbase", "head_center", "skull_tip"),
@@ -30,6 +33,8 @@ _LINES = (
 """Joints of the default humans that are drawn as lines; a body with other joints is drawn as points."""
 _MOST_FRAMES = 300
 """Frames of the animation; more make the page slow."""
+_MOST_PIXELS = 600_000
+"""Pixels of a picture of the film: one of two cameras side by side is 480 high, which is half a screen."""
 _TOGETHER = """<script>
 const film = document.getElementById("film");
 for (const plot of document.querySelectorAll(".js-plotly-plot"))
@@ -67,23 +72,24 @@ def report_page(name: str, tracks: Mapping[str, Track], *, film: Path | None = N
 
 
 def playable(film: Path) -> bytes:
-    """A film as a WebM, which browsers play.
+    """A film as a WebM, which browsers play, in the size that a page shows.
 
     Raises:
-        VoodooError: it cannot be read, or OpenCV cannot write a WebM.
+        VoodooError: it cannot be read, or a WebM cannot be written.
     """
     source = opened_video(film)
     readable, picture = source.read()
     if not readable:
         raise VoodooError(f"{film}: expected a film, found none that can be read")
-    with TemporaryDirectory() as folder:
+    scale = min(1.0, math.sqrt(_MOST_PIXELS / (picture.shape[0] * picture.shape[1])))
+    height, width = (max(round(scale * size / 2) * 2, 2) for size in picture.shape[:2])
+    with TemporaryDirectory() as folder, naming(film, VoodooError):
         place = Path(folder) / "film.webm"
-        rate, size = source.get(cv2.CAP_PROP_FPS) or ASSUMED_RATE_HZ, picture.shape[1::-1]
-        writer = cv2.VideoWriter(str(place), cv2.VideoWriter.fourcc(*"VP80"), rate, size)
-        if not writer.isOpened():
-            raise VoodooError(f"{film}: expected an OpenCV that writes it as VP8 for browsers, found one that cannot")
+        rate = source.get(cv2.CAP_PROP_FPS) or ASSUMED_RATE_HZ
+        writer = small_film(place, (height, width, 3), rate_hz=rate)
         while readable:
-            writer.write(picture)
+            small = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA)
+            writer.write(small.astype(np.uint8, copy=False))
             readable, picture = source.read()
         writer.release()
         source.release()
@@ -114,8 +120,8 @@ def _figure(track: Track) -> Any:  # noqa: ANN401 - Plotly
         rows=4, cols=2, column_widths=[0.45, 0.55], row_heights=[0.34, 0.26, 0.2, 0.2], vertical_spacing=0.06,
         subplot_titles=titles, specs=[[{"type": "scene", "rowspan": 4}, {}], *[[None, {}]] * 3],
     )  # fmt: skip
-    times = track.stamps - track.stamps[0]
-    paths = _paths(track)
+    times = _single(track.stamps - track.stamps[0])
+    paths = _single(_paths(track))
     figure.add_trace(_drawn(paths[0]), row=1, col=1)
     words = list(_LIMB_COLORS)
     codes = [[words.index(word) if word in words else 3 for word in one] for one in track.limb_status.values()]
@@ -127,7 +133,7 @@ def _figure(track: Track) -> Any:  # noqa: ANN401 - Plotly
             go.Heatmap(x=times, y=names, z=codes, text=text, hoverinfo="x+y+text", **heatmap_style), row=1, col=2
         )
     joints = track.joint_names[: track.joint_sigma.shape[1]]
-    angles, sigmas = np.degrees(track.angles), np.degrees(track.angle_sigma)
+    angles, sigmas = _single(np.degrees(track.angles)), _single(np.degrees(track.angle_sigma))
     for number, (name, column) in enumerate(zip(track.angle_names, angles.T, strict=True)):
         color = _COLORS[number % len(_COLORS)]
         how: dict[str, Any] = {"mode": "lines", "showlegend": False, "line": {"color": color}}
@@ -140,9 +146,9 @@ def _figure(track: Track) -> Any:  # noqa: ANN401 - Plotly
             figure.add_trace(go.Scatter(x=there, y=edge, hoverinfo="skip", showlegend=False, **band), row=2, col=2)
             how |= {"customdata": around, "hovertemplate": "%{y:.1f} ± %{customdata:.1f}"}
         figure.add_trace(go.Scatter(x=times, y=column, name=name, **how), row=2, col=2)
-    for name, column in zip(joints, track.joint_sigma.T, strict=True):
+    for name, column in zip(joints, _single(track.joint_sigma).T, strict=True):
         figure.add_trace(go.Scatter(x=times, y=column, name=name, mode="lines", showlegend=False), row=3, col=2)
-    figure.add_trace(go.Scatter(x=times, y=track.residual, mode="lines", showlegend=False), row=4, col=2)
+    figure.add_trace(go.Scatter(x=times, y=_single(track.residual), mode="lines", showlegend=False), row=4, col=2)
     chosen = np.unique(np.linspace(0, len(track) - 1, min(len(track), _MOST_FRAMES)).round().astype(int))
     figure.frames = [
         go.Frame(data=[_drawn(paths[index])], traces=[0], name=f"{times[index]:.2f}", layout=_cursor(times[index]))
@@ -168,6 +174,11 @@ def _figure(track: Track) -> Any:  # noqa: ANN401 - Plotly
     return figure
 
 
+def _single(values: FloatArray) -> npt.NDArray[np.float32]:
+    """Numbers of a drawing, which need half of the digits."""
+    return values.astype(np.float32)
+
+
 def _paths(track: Track) -> FloatArray:
     """(F, N, 3) corners of the lines, NaN between two lines."""
     index = {name: number for number, name in enumerate(track.joint_names)}
@@ -177,7 +188,7 @@ def _paths(track: Track) -> FloatArray:
     return np.concatenate(known, axis=1) if known else track.joints
 
 
-def _drawn(path: FloatArray) -> Any:  # noqa: ANN401 - Plotly
+def _drawn(path: npt.NDArray[np.float32]) -> Any:  # noqa: ANN401 - Plotly
     from plotly import graph_objects as go
 
     x, y, z = path.T
@@ -185,7 +196,7 @@ def _drawn(path: FloatArray) -> Any:  # noqa: ANN401 - Plotly
     return go.Scatter3d(x=x, y=y, z=z, mode="lines+markers", showlegend=False, hoverinfo="skip", **style)
 
 
-def _cursor(time: float) -> dict[str, Any]:
+def _cursor(time: float | np.float32) -> dict[str, Any]:
     """A line at the time of the skeleton in all plots."""
     return {"shapes": [{"type": "line", "x0": time, "x1": time, "xref": "x", "yref": "paper", "y0": 0, "y1": 1}]}
 

@@ -7,7 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, a_path
 from voodoo.live.source import Source
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import open_recording
@@ -65,6 +65,10 @@ def source_of(
         raise VoodooError(f"rate: expected a number above 0, found {rate}")
     if root_frame is not None:
         options["root_frame"] = root_frame
+    if not a_path(word, error=VoodooError).exists():
+        raise VoodooError(
+            f"{word}: expected a recording, {', '.join(CAMERAS)}, {ROS2}:TOPIC or {GROW}:FOLDER, found no such file or folder"
+        )
     left_out = LeftOut()
     recording = open_recording(word, bare=True, left_out=left_out, **options)
     return PlayedSource(recording, rate=rate, loop=loop, left_out=left_out)
