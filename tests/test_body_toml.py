@@ -108,9 +108,9 @@ def test_names_of_any_kind_survive():
         (
             "length = 0.2",
             "length = 200.0",
-            ["limbs.base.shape.length", "meters, 30 at most", "200 millimeters are 0.2"],
+            ["limbs.base.shape.length", "meters, 100 at most", "200 millimeters are 0.2"],
         ),
-        ("a0 = 0.1, b0", "a0 = 100, b0", ["limbs.base.shape.a0", "meters, 30 at most", "found 100"]),
+        ("a0 = 0.1, b0", "a0 = 120, b0", ["limbs.base.shape.a0", "meters, 100 at most", "found 120"]),
         (
             "semi_axes = [0.02, 0]",
             "limits = [[-90, 90], [0, 0], [0, 0]]",

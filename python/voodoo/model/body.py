@@ -202,8 +202,8 @@ def ordered_poses(body: Body, world_from_limb: Mapping[str, npt.ArrayLike]) -> l
     return [world_from_limb[name] for name in names]
 
 
-_LONGEST_M = 30.0
-"""A longer limb is out of the range of depth cameras and most lasers; one of 3 cm in millimeters is as long."""
+_LONGEST_M = 100.0
+"""A longer limb is out of the range of cameras and most lasers; one of 10 cm in millimeters is as long."""
 
 
 def _meters(size: float) -> float:
