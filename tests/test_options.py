@@ -95,3 +95,9 @@ def test_an_option_that_no_loader_has_is_answered_with_those_there_are():
         VoodooError, match=r"expected an option of the loader ros2 \(use, depth_topic.*, found depth_topics$"
     ):
         open_recording(sample_path(), depth_topics="/front")
+
+
+@pytest.mark.parametrize(("command", "height"), [("track", "180"), ("body", "17"), ("init", "0.2"), ("live", "nan")])
+def test_a_stature_in_another_unit_is_a_wrong_option(command, height):
+    done = run(command, *([] if command == "body" else ["nowhere"]), "--height", height)
+    assert done.exit_code == 2 and "'--height': stature: expected meters from 0.3 to 3.0, found" in done.stderr

@@ -244,6 +244,12 @@ def test_damaged_images_of_a_folder_are_left_out(tmp_path):
         open_recording(path)
 
 
+def test_images_turned_against_their_calibration_are_called_so(tmp_path):
+    path = folder(tmp_path / "f", ["0.0"], image=np.ascontiguousarray(DEPTH.T))
+    with pytest.raises(RecordingError, match=r"expected 4x3 px as calibrated, found 3x4, as of images .* turned by 90"):
+        list(open_recording(path))
+
+
 def test_a_list_of_images_whose_clock_was_set_back_goes_on(tmp_path):
     path = folder(tmp_path / "f", ["a", "b", "c", "d", "e"])
     stamps = (100.0, 100.1, 50.0, 50.1, 50.2)

@@ -30,8 +30,23 @@ RecordingArgument = Annotated[
 ConfigOption = Annotated[
     Path | None, typer.Option(metavar="FILE", help="Settings as TOML; `voodoo config` prints all of them.")
 ]
+
+
+def _stature(height: float | None) -> float | None:
+    """Checked by the body, which names the unit."""
+    if height is not None:
+        from voodoo.model.body import Body
+
+        try:
+            Body.human(height)
+        except VoodooError as error:
+            raise typer.BadParameter(str(error)) from None
+    return height
+
+
 HeightOption = Annotated[
-    float | None, typer.Option(metavar="M", min=0.3, max=3.0, help="Stature of the person in meters.")
+    float | None,
+    typer.Option(metavar="M", callback=_stature, help="Stature of the person in meters, 0.3 to 3."),
 ]
 AgeOption = Annotated[
     float | None,

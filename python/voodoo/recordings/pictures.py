@@ -82,8 +82,10 @@ def check_size(found: tuple[int, ...], source: object, size: tuple[int, int]) ->
         RecordingError: another size than expected, (width, height).
     """
     if found != size:
+        turned = ", as of images or a calibration turned by 90 degrees" if found == size[::-1] else ""
+        what = f"{'x'.join(map(str, found)) or 'nothing'}{turned}"
         raise RecordingError(
-            f"{source}: expected {size[0]}x{size[1]} px as calibrated, found {'x'.join(map(str, found)) or 'nothing'}",
+            f"{source}: expected {size[0]}x{size[1]} px as calibrated, found {what}",
             reason="of another size than calibrated",
         )
 
