@@ -321,7 +321,7 @@ def test_a_cut_color_image_is_refused_when_checked(frames):
 def test_loaders_options_and_paths_that_do_not_exist_are_named(tmp_path):
     with pytest.raises(RecordingError, match="ros2, ros1, utd-mhad, folder"):
         open_recording(sample_path(), loader="vhs")
-    with pytest.raises(RecordingError, match=r"no option depht_topic.*depth_topic"):
+    with pytest.raises(RecordingError, match=r"option of the loader ros2.*depth_topic.*found depht_topic"):
         open_recording(sample_path(), depht_topic="/x")
     with pytest.raises(RecordingError, match="no such file"):
         open_recording(tmp_path / "nothing")
