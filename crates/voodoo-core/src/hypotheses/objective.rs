@@ -4,9 +4,8 @@ use crate::association::correspondence::Correspondences;
 use crate::fit::{Context, Fit};
 use crate::math::Pose;
 use crate::regions::ColorRegions;
-use crate::terms::{
-    PATCH, cost_of_points, detected_cost, floor_cost, limit_cost, penetration_cost, site_cost, stance_cost,
-};
+use crate::solver::SITE_SCALE;
+use crate::terms::{DetectedJoints, Floor, Limits, PATCH, Penetration, Sites, Term, cost_of_points, stance_cost};
 use crate::visibility::evidence::limb_visibility;
 
 /// Decrease of the cost at which another pose is better, nats: the odds are 20 to 1. An arm or leg is tested only where that much
@@ -39,16 +38,18 @@ impl<'a> Objective<'a> {
     /// Cost of the pose of one limb but for the points.
     pub(crate) fn limb(&self, poses: &[Pose], limb: usize) -> f64 {
         let Self { context, correspondences, regions, .. } = *self;
-        let Context { model, observation, .. } = context;
-        let (body, floor) = (&model.body, observation.floor());
+        let Context { model, observation, config, .. } = context;
+        let information = config.point_information();
+        let (body, pairs, floor) = (&model.body, &correspondences.detected, observation.floor());
+        let cost = |term: &dyn Term| term.cost(body, poses, limb);
         let of_colors = |regions: &ColorRegions| -PATCH * regions.pixel_gain(context.posed(poses), limb)[0];
         VIOLATION * PATCH * limb_visibility(observation.views, &body.limbs()[limb], &poses[limb]).free_space
-            + site_cost(&correspondences.sites, poses, limb)
-            + detected_cost(&correspondences.detected, body, poses, limb)
+            + cost(&Sites { correspondences, information, scale: SITE_SCALE, biased: true })
+            + cost(&DetectedJoints { pairs })
             + regions.map_or(0.0, of_colors)
-            + limit_cost(body, poses, limb)
-            + penetration_cost(body, poses, limb)
-            + floor.map_or(0.0, |floor| floor_cost(floor, body, poses, limb))
+            + cost(&Limits)
+            + cost(&Penetration { spheres: &[] })
+            + floor.map_or(0.0, |plane| cost(&Floor { plane }))
             + floor.map_or(0.0, |floor| stance_cost(floor, model, poses, limb))
     }
 

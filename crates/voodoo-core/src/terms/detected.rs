@@ -32,15 +32,14 @@ impl Term for DetectedJoints<'_> {
             normal.limbs[limb].add_point(&(Mat3::IDENTITY * information), x, r);
         }
     }
-}
 
-/// Cost of the pose of a limb by the joints that were detected on it, nats.
-pub(crate) fn detected_cost(pairs: &[DetectedPair], body: &Body, poses: &[Pose], limb: usize) -> f64 {
-    let cost = |pair: &DetectedPair| {
-        let off = (poses[limb] * body.sites()[pair.site].position).distance(pair.p) - WITHIN_SIGMAS * pair.sigma;
-        PATCH * ELSEWHERE_COST * (off.max(0.0) / APART).powi(2).min(1.0)
-    };
-    pairs.iter().filter(|pair| body.sites()[pair.site].limb == limb).map(cost).sum()
+    fn cost(&self, body: &Body, poses: &[Pose], limb: usize) -> f64 {
+        let cost = |pair: &DetectedPair| {
+            let off = (poses[limb] * body.sites()[pair.site].position).distance(pair.p) - WITHIN_SIGMAS * pair.sigma;
+            PATCH * ELSEWHERE_COST * (off.max(0.0) / APART).powi(2).min(1.0)
+        };
+        self.pairs.iter().filter(|pair| body.sites()[pair.site].limb == limb).map(cost).sum()
+    }
 }
 
 #[cfg(test)]
@@ -57,7 +56,9 @@ mod tests {
             let Site { limb, position, .. } = model.body.sites()[3];
             let pair = DetectedPair { site: 3, p: poses[limb] * position, sigma: 0.05, information: 1.0 };
             let shifted = moved(&poses, off * Vec3::Y);
-            (0..poses.len()).map(|limb| detected_cost(&[pair], &model.body, &shifted, limb)).sum::<f64>()
+            (0..poses.len())
+                .map(|limb| DetectedJoints { pairs: &[pair] }.cost(&model.body, &shifted, limb))
+                .sum::<f64>()
         };
         assert_eq!(cost(WITHIN_SIGMAS * 0.05), 0.0);
         assert!((cost(WITHIN_SIGMAS * 0.05 + 0.05) - 0.25 * 3.0).abs() < 1e-9 && (cost(1.0) - 3.0).abs() < 1e-9);

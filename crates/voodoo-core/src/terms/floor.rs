@@ -25,10 +25,9 @@ impl Term for Floor {
             }
         }
     }
-}
 
-/// Cost of the pose of a limb whose end is below the ground, nats.
-pub(crate) fn floor_cost(plane: Ground, body: &Body, poses: &[Pose], limb: usize) -> f64 {
-    let end = poses[limb] * (Vec3::Z * body.limbs()[limb].shape.length());
-    (0.5 * (plane.height(end).min(0.0) / OVERLAP_SIGMA).powi(2)).min(LARGEST_COST)
+    fn cost(&self, body: &Body, poses: &[Pose], limb: usize) -> f64 {
+        let end = poses[limb] * (Vec3::Z * body.limbs()[limb].shape.length());
+        (0.5 * (self.plane.height(end).min(0.0) / OVERLAP_SIGMA).powi(2)).min(LARGEST_COST)
+    }
 }

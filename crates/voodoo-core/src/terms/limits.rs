@@ -23,14 +23,13 @@ impl Term for Limits {
             (excess.abs() > 0.0).then_some((weight, excess))
         });
     }
-}
 
-/// Cost of the pose of a limb whose joint is beyond its limits, nats.
-pub(crate) fn limit_cost(body: &Body, poses: &[Pose], limb: usize) -> f64 {
-    let Some((limits, _, v)) = limited_turn(body, poses, limb) else { return 0.0 };
-    let excess = |(axis, [low, high]): (usize, &[f64; 2])| (low - v[axis]).max(v[axis] - high).max(0.0);
-    let squares: f64 = limits.iter().enumerate().map(|limit| (excess(limit) / LIMIT_SIGMA).powi(2)).sum();
-    (0.5 * squares).min(LARGEST_LIMIT_COST)
+    fn cost(&self, body: &Body, poses: &[Pose], limb: usize) -> f64 {
+        let Some((limits, _, v)) = limited_turn(body, poses, limb) else { return 0.0 };
+        let excess = |(axis, [low, high]): (usize, &[f64; 2])| (low - v[axis]).max(v[axis] - high).max(0.0);
+        let squares: f64 = limits.iter().enumerate().map(|limit| (excess(limit) / LIMIT_SIGMA).powi(2)).sum();
+        (0.5 * squares).min(LARGEST_LIMIT_COST)
+    }
 }
 
 /// Adds a row for every component of the rotation of every joint with limits. `row` returns weight and residual for the component
@@ -92,11 +91,12 @@ mod tests {
         let elbow = model.extremities[first_arm(&model)].lower;
         let (parent, joint) = model.body.limbs()[elbow].parent.as_ref().unwrap();
         let [[least, _], ..] = joint.limits.unwrap();
-        assert!(limit_cost(&model.body, &poses, elbow) < 1e-9);
+        let term = Limits;
+        assert!(term.cost(&model.body, &poses, elbow) < 1e-9);
         for (beyond, expected) in [(0.05, 0.5), (0.1, 2.0), (0.4, LARGEST_LIMIT_COST)] {
             let mut bent = poses.clone();
             bent[elbow] = place(joint, &poses[*parent], Quat::from_axis_angle(hinge_axis(joint), least - beyond));
-            let cost = limit_cost(&model.body, &bent, elbow);
+            let cost = term.cost(&model.body, &bent, elbow);
             assert!((cost - expected).abs() < 1e-6, "{cost} for {beyond}");
         }
     }

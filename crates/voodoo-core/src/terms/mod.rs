@@ -12,14 +12,14 @@ mod sites;
 mod stance;
 mod surface;
 
-pub(crate) use detected::{DetectedJoints, detected_cost};
+pub(crate) use detected::DetectedJoints;
 pub(crate) use edges::Edges;
-pub(crate) use floor::{Floor, floor_cost};
-pub(crate) use limits::{Limits, limit_cost};
-pub(crate) use penetration::{Penetration, penetration_cost};
+pub(crate) use floor::Floor;
+pub(crate) use limits::Limits;
+pub(crate) use penetration::Penetration;
 pub(crate) use posture::Posture;
 pub(crate) use prior::{Prior, Rest};
-pub(crate) use sites::{APART, Sites, site_cost};
+pub(crate) use sites::{APART, Sites};
 pub(crate) use stance::stance_cost;
 pub(crate) use surface::{Surface, cost_of_points, unexplained};
 
@@ -39,12 +39,17 @@ const OVERLAP_SIGMA: f64 = 0.03;
 
 /// One term of the cost function.
 ///
-/// The solver linearizes a term at poses that differ by millimeters. Poses that differ by centimeters are compared by functions
-/// of its cost, a negative log-likelihood of the pose of one limb, nats. It is limited, because no model of an error holds far away,
-/// and lower than the sum of squares, because nearby measurements err alike.
+/// The solver linearizes a term at poses that differ by millimeters. Poses that differ by centimeters are compared by its cost,
+/// which is limited, because no model of an error holds far away, and lower than the sum of squares, because nearby measurements
+/// err alike. What only tells such poses apart, and moves none, is a function of its cost.
 pub(crate) trait Term {
     /// Adds gradient and information at `poses` (working frame).
     fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations);
+
+    /// Negative log-likelihood of the pose of one limb, nats. Terms that do not tell such poses apart have none.
+    fn cost(&self, _body: &Body, _poses: &[Pose], _limb: usize) -> f64 {
+        0.0
+    }
 }
 
 /// The terms of all measurements: those that the solver fits and from which covariances follow.

@@ -39,19 +39,18 @@ impl Term for Penetration<'_> {
             }
         }
     }
-}
 
-/// Cost of the pose of a limb inside other limbs, nats: twice the negative log-likelihood that `OVERLAP_SIGMA` gives, so fitted to
-/// right and wrong poses of rendered people.
-pub(crate) fn penetration_cost(body: &Body, poses: &[Pose], limb: usize) -> f64 {
-    let sphere = |limb: usize| body.limbs()[limb].shape.sphere(&poses[limb]);
-    let (own, mut squares) = (sphere(limb), 0.0);
-    for other in (0..poses.len()).filter(|other| body.are_apart(limb, *other)) {
-        if overlap(own, sphere(other)) {
-            each_overlap(body, poses, [limb, other], |_, _, depth| squares += (depth / OVERLAP_SIGMA).powi(2));
+    /// Twice the negative log-likelihood that `OVERLAP_SIGMA` gives: so fitted to right and wrong poses of rendered people.
+    fn cost(&self, body: &Body, poses: &[Pose], limb: usize) -> f64 {
+        let sphere = |limb: usize| body.limbs()[limb].shape.sphere(&poses[limb]);
+        let (own, mut squares) = (sphere(limb), 0.0);
+        for other in (0..poses.len()).filter(|other| body.are_apart(limb, *other)) {
+            if overlap(own, sphere(other)) {
+                each_overlap(body, poses, [limb, other], |_, _, depth| squares += (depth / OVERLAP_SIGMA).powi(2));
+            }
         }
+        squares.min(LARGEST_COST)
     }
-    squares.min(LARGEST_COST)
 }
 
 /// Calls `each` with every tested point of `limb` that lies inside `other`, the normal of the surface of `other` there, and the
@@ -88,7 +87,9 @@ mod tests {
     fn an_arm_inside_the_trunk_has_a_cost_and_one_beside_it_has_none() {
         let (model, poses) = standing();
         let (body, chain) = (&model.body, &model.extremities[first_arm(&model)]);
-        let cost = |poses: &[Pose]| -> f64 { chain.limbs().map(|limb| penetration_cost(body, poses, limb)).sum() };
+        let cost = |poses: &[Pose]| -> f64 {
+            chain.limbs().map(|limb| Penetration { spheres: &[] }.cost(body, poses, limb)).sum()
+        };
         assert_eq!(cost(&poses), 0.0);
         let mut inside = poses.clone();
         chain.reach(body, &mut inside, 0.5 * (poses[0].translation + chain.root(body, &poses)), 0.0);

@@ -30,16 +30,16 @@ impl Term for Sites<'_> {
             normal.limbs[pair.limb].add_point(&(pair.across * pair.weight * (self.information * kernel)), pair.x, r);
         }
     }
-}
 
-/// Cost of the pose of a limb by its sites, nats: one away from its measurement costs as much as unexplained patches of its weight.
-pub(crate) fn site_cost(sites: &[SitePair], poses: &[Pose], limb: usize) -> f64 {
-    let apart = |pair: &SitePair| {
-        // Where only a ray was measured, `across` projects onto the plane perpendicular to it.
-        let off = (pair.across * (poses[limb] * pair.local - pair.p)).length() - pair.bias;
-        PATCH * pair.base_weight * (off.max(0.0) / APART).powi(2).min(1.0)
-    };
-    sites.iter().filter(|pair| pair.limb == limb).map(apart).sum()
+    /// A site away from its measurement costs as much as unexplained patches of its weight.
+    fn cost(&self, _body: &Body, poses: &[Pose], limb: usize) -> f64 {
+        let apart = |pair: &SitePair| {
+            // Where only a ray was measured, `across` projects onto the plane perpendicular to it.
+            let off = (pair.across * (poses[limb] * pair.local - pair.p)).length() - pair.bias;
+            PATCH * pair.base_weight * (off.max(0.0) / APART).powi(2).min(1.0)
+        };
+        self.correspondences.sites.iter().filter(|pair| pair.limb == limb).map(apart).sum()
+    }
 }
 
 #[cfg(test)]
@@ -60,7 +60,9 @@ mod tests {
             SitePair { limb, local, x, p, weight: 2.0, base_weight: 2.0, bias: 0.0, across, source: 0 }
         };
         let cost_at = |pair: SitePair, poses: &[Pose]| {
-            let all: Vec<f64> = (0..poses.len()).map(|limb| site_cost(&[pair], poses, limb)).collect();
+            let correspondences = Correspondences { sites: vec![pair], ..Correspondences::default() };
+            let sites = Sites { correspondences: &correspondences, information: 1.0, scale: 1.0, biased: true };
+            let all: Vec<f64> = (0..poses.len()).map(|limb| sites.cost(&model.body, poses, limb)).collect();
             assert_eq!(all.iter().sum::<f64>(), all[limb], "no cost of other limbs");
             all[limb] / PATCH
         };

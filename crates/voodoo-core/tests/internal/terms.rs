@@ -10,7 +10,7 @@ use voodoo_core::math::{Mat3, Pose, Quat, Vec3, rotation_vector};
 use voodoo_core::observation::frame::Ground;
 use voodoo_core::terms::normal_equations::NormalEquations;
 use voodoo_core::terms::{
-    DetectedJoints, Edges, Floor, Limits, Penetration, Posture, Prior, Rest, Sites, Surface, Term, floor_cost,
+    DetectedJoints, Edges, Floor, Limits, Penetration, Posture, Prior, Rest, Sites, Surface, Term,
 };
 use voodoo_core::{Body, Joint};
 
@@ -263,7 +263,7 @@ proptest! {
             // What is above feels nothing.
             prop_assert_eq!(height < 0.0, push.norm() > 0.0);
             let expected = (0.5 * depth(&poses[limb], part.shape.length())).min(10.0);
-            prop_assert!((floor_cost(term.plane, &body, &poses, limb) - expected).abs() < 1e-12);
+            prop_assert!((term.cost(&body, &poses, limb) - expected).abs() < 1e-12);
         }
     }
 
