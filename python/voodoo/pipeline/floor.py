@@ -22,6 +22,8 @@ _ON_FLOOR_M = 0.3
 """An ankle at most this high stands on the floor that is seen; a plane elsewhere is a table."""
 _ALIKE = 0.995
 """Least cosine between the normals of one floor (6 degrees); where they differ more, the root frame moves on the floor."""
+_ENOUGH = 3
+"""So many floors that are seen are enough to judge the poses of cameras."""
 _SURE = 0.994
 """Confidence of a detection that is enough to start a track."""
 _UP = (0.0, 0.0, 1.0)
@@ -87,14 +89,21 @@ class FloorSight:
 
 
 def _look(
-    recording: Recording, *, up: tuple[float, float, float] | None, left_out: LeftOut | None = None
+    recording: Recording,
+    *,
+    up: tuple[float, float, float] | None,
+    left_out: LeftOut | None = None,
+    enough: int = _FRAMES,
 ) -> FloorSight:
-    """What a recording shows in its first seconds; `left_out`: that of the recording, which does not count what is read."""
+    """What a recording shows in its first seconds, until enough floors are seen; `left_out`: that of the recording, which does
+    not count what is read."""
     sight = FloorSight(up=up)
     # Tracking reports damage; what was seen before it counts.
     with nullcontext() if left_out is None else left_out.aside(), suppress(VoodooError):
         for recorded in islice(recording, 0, _FRAMES, EVERY):
             sight.observe(recorded)
+            if len(sight.planes) >= enough:
+                break
     return sight
 
 
@@ -110,9 +119,11 @@ def look(recording: Recording, *, left_out: LeftOut | None = None) -> FloorSight
         recording: is read from its start.
         left_out: that of the recording, which does not count what is read here.
     """
-    if not recording.info().camera_root and (sight := _look(recording, up=_UP, left_out=left_out)).planes:
-        return sight
-    return _look(recording, up=None, left_out=left_out)  # upwards in the images
+    if not recording.info().camera_root:
+        sight = _look(recording, up=_UP, left_out=left_out, enough=_ENOUGH)
+        if sight.planes:
+            return sight
+    return _look(recording, up=None, left_out=left_out, enough=_ENOUGH)  # upwards in the images
 
 
 def floor_words(floor: tuple[FloatArray, float] | None, root_frame: str) -> str:
