@@ -83,7 +83,7 @@ def test_a_doubtful_detection_needs_others():
         count.append(len(people.step(frame(index / 30.0, person(), log_odds=2.5))))
         words.append(people.refusal)
     assert count == [0, 0, 1, 1]
-    assert "of 81.8 %, expected 98.2 %" in words[0] and "of 95.3 %" in words[1] and words[2:] == [None, None]
+    assert "of 0.818, expected 0.982" in words[0] and "of 0.953" in words[1] and words[2:] == [None, None]
     others = voodoo.People(detector=None)
     assert not any(len(others.step(frame(index / 30.0, person(), log_odds=0.5))) for index in range(9))
 

@@ -329,6 +329,15 @@ def renamed(folder, names):
         file.rename(file.with_name(f"{name}.png"))
 
 
+def stamped(folder, stamps, *, listed):
+    """Writes other stamps into the list of images, or into their names."""
+    if listed:
+        lines = [f"{stamp} depth/{name}.png\n" for stamp, name in zip(stamps, STAMPS, strict=True)]
+        (folder / "depth.txt").write_text("".join(lines))
+    else:
+        renamed(folder, stamps)
+
+
 @pytest.mark.parametrize(
     "stamps",
     [
@@ -339,11 +348,7 @@ def renamed(folder, names):
 )
 @pytest.mark.parametrize("listed", [False, True])
 def test_times_since_1970_tell_their_unit_in_names_and_lists(folder, stamps, listed):
-    if listed:
-        lines = [f"{stamp} depth/{name}.png\n" for stamp, name in zip(stamps, STAMPS, strict=True)]
-        (folder / "depth.txt").write_text("".join(lines))
-    else:
-        renamed(folder, stamps)
+    stamped(folder, stamps, listed=listed)
     found = [frame.stamp for frame in open_recording(folder)]
     np.testing.assert_allclose(np.subtract(found, 1305031102.0), (0.16, 0.193, 0.227), atol=1e-3)
 
@@ -351,11 +356,7 @@ def test_times_since_1970_tell_their_unit_in_names_and_lists(folder, stamps, lis
 @pytest.mark.parametrize("listed", [False, True])
 @pytest.mark.parametrize("texts", [("1000", "1033", "1067"), ("1000.0", "1033.4", "1066.7")])
 def test_the_unit_of_stamps_can_be_told(folder, listed, texts):
-    if listed:
-        lines = [f"{stamp} depth/{name}.png\n" for stamp, name in zip(texts, STAMPS, strict=True)]
-        (folder / "depth.txt").write_text("".join(lines))
-    else:
-        renamed(folder, texts)
+    stamped(folder, texts, listed=listed)
     recording = open_recording(folder, seconds_per_unit=0.001)
     np.testing.assert_allclose([frame.stamp for frame in recording], (1.0, 1.033, 1.067), atol=1e-3)
     assert recording.assumed == ()

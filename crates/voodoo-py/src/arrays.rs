@@ -19,6 +19,9 @@ pub(crate) enum PointView<'py> {
     Double(PyReadonlyArray2<'py, f64>),
 }
 
+/// What is expected of an array for a [`DepthView`].
+pub(crate) const DEPTH_ARRAY: &str = "an array of shape (height, width) and dtype uint16 or float32";
+
 /// A borrow of a depth image `(height, width)`, contiguous and aligned.
 #[derive(FromPyObject)]
 pub(crate) enum DepthView<'py> {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::IntoPyDict;
-use voodoo_core::math::{Pose, Vec3};
+use voodoo_core::math::{Pose, Vec3, probability};
 use voodoo_core::{
     Body, Camera, DepthImage, DepthPixels, Detect, DetectError, Detection, DetectionQuery, Frame, Ground, HumanModel,
     Surroundings,
@@ -86,11 +86,6 @@ fn with_weights(path: PathBuf) -> PyResult<Detector> {
     let refused = |found: String| MeasurementError::new_err(format!("{}: {found}", path.display()));
     let bytes = std::fs::read(&path).map_err(|error| refused(format!("expected a readable file, found {error}")))?;
     Detector::with_weights(&bytes).map_err(|error| refused(error.to_string()))
-}
-
-/// Converts log odds to a probability.
-fn probability(log_odds: f64) -> f64 {
-    1.0 / (1.0 + (-log_odds).exp())
 }
 
 /// An image of the pixels with these indices, as a mask.

@@ -1,7 +1,6 @@
 //! Detectors that are passed from Python.
 
 use std::collections::HashMap;
-use std::ffi::CString;
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
@@ -12,7 +11,7 @@ use voodoo_core::math::{Vec3, matrix};
 use voodoo_core::{DepthImage, Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Ground, Surroundings};
 
 use crate::arrays::{Row, contiguous, vector};
-use crate::errors::{ConfigError, MeasurementError, unless, wrong, wrong_argument};
+use crate::errors::{ConfigError, MeasurementError, unless, warn, wrong, wrong_argument};
 
 /// Standard deviation of a joint for which a detector reports none, meters.
 const SIGMA: f64 = 0.05;
@@ -51,10 +50,9 @@ pub(crate) fn warn_of_detector(py: Python<'_>, error: Option<&DetectError>, fail
     if let Some(cause) = cause.filter(|cause| !cause.is_instance_of::<PyException>(py)) {
         return Err(cause.clone_ref(py));
     }
-    let category = py.import("voodoo.errors")?.getattr("DetectorWarning")?;
-    let text = format!("the detector failed, the step went on without it: {error}").replace('\0', "");
+    let text = format!("the detector failed, the step went on without it: {error}");
     // Python's own wrapper of the step is one stack frame; its caller is the next.
-    PyErr::warn(py, &category, &CString::new(text)?, 2).inspect_err(|raised| {
+    warn(py, "DetectorWarning", text, 2).inspect_err(|raised| {
         raised.set_cause(py, cause.map(|cause| cause.clone_ref(py)));
     })
 }

@@ -1,5 +1,6 @@
 //! Core errors become the exceptions of `voodoo.errors`.
 
+use std::ffi::CString;
 use std::fmt::Display;
 
 use numpy::{PyUntypedArray, PyUntypedArrayMethods};
@@ -37,4 +38,10 @@ pub(crate) fn unless(valid: bool, name: impl Display, expected: impl Display, fo
 
 pub(crate) fn wrong_argument(name: &str, expected: &str, found: &Bound<'_, PyAny>) -> PyErr {
     MeasurementError::new_err(wrong(name, expected, found))
+}
+
+/// Warns by a category of voodoo.errors of what the caller so many stack frames above did.
+pub(crate) fn warn(py: Python<'_>, category: &str, text: String, level: i32) -> PyResult<()> {
+    let category = py.import("voodoo.errors")?.getattr(category)?;
+    PyErr::warn(py, &category, &CString::new(text.replace('\0', ""))?, level)
 }

@@ -1,6 +1,5 @@
 //! `Frame`: holds references to the caller's arrays until the step reads them.
 
-use std::ffi::CString;
 use std::sync::Arc;
 
 use numpy::{PyUntypedArray, PyUntypedArrayMethods};
@@ -10,10 +9,10 @@ use voodoo_core::math::Aabb;
 use voodoo_core::{Camera, Cloud, Ground, PointSlice, PositionRelation, RayRelation, Scope};
 
 use crate::arguments;
-use crate::arrays::{DepthView, Row, contiguous, picture, points, pose, unmasked, vector, viewable};
+use crate::arrays::{DEPTH_ARRAY, DepthView, Row, contiguous, picture, points, pose, unmasked, vector, viewable};
 use crate::borrowed::{CloudData, ColorData, ColorViews, DepthViews, ImageData, PositionData, RayData, number};
 use crate::camera::camera_of;
-use crate::errors::{unless, wrong_argument};
+use crate::errors::{unless, warn, wrong_argument};
 use crate::sites::PySiteRay;
 
 #[doc = stub!("Frame")]
@@ -89,8 +88,7 @@ impl PyFrame {
         source: &str,
     ) -> PyResult<()> {
         let [height, width] = [camera.height(), camera.width()];
-        let expected = "an array of shape (height, width) and dtype uint16 or float32";
-        let wrong = |found: &Bound<'_, PyAny>| wrong_argument("image", expected, found);
+        let wrong = |found: &Bound<'_, PyAny>| wrong_argument("image", DEPTH_ARRAY, found);
         let array = image.cast::<PyUntypedArray>().map_err(|_| wrong(&image.get_type()))?;
         unmasked("image", image, "fill it with 0, which is no return: image.filled(0)")?;
         let pixels = viewable::<DepthView>(image).ok_or_else(|| wrong(image))?;
@@ -271,18 +269,16 @@ impl PyFrame {
 #[doc = stub!("implausible_depth")]
 #[pyfunction]
 pub(crate) fn implausible_depth(image: &Bound<'_, PyAny>, meters_per_unit: f64) -> PyResult<Option<f64>> {
-    let expected = "an array of shape (height, width) and dtype uint16 or float32";
     let view = contiguous(image).and_then(|array| array.extract::<DepthView>());
-    let view = view.map_err(|_| wrong_argument("image", expected, image))?;
+    let view = view.map_err(|_| wrong_argument("image", DEPTH_ARRAY, image))?;
     Ok(view.pixels()?.implausible_depth(meters_per_unit))
 }
 
 /// The words are the same in every frame: Python shows them once.
 fn warn_of_unit(py: Python<'_>, source: &str, unit: f64) -> PyResult<()> {
-    let category = py.import("voodoo.errors")?.getattr("UnitWarning")?;
     let text = format!(
         "{source}: expected depths of meters, found a median below 1 cm or beyond 100 m with meters_per_unit={unit}, \
          which is 0.001 for an image in millimeters and 1.0 for one in meters"
     );
-    PyErr::warn(py, &category, &CString::new(text.replace('\0', ""))?, 1)
+    warn(py, "UnitWarning", text, 1)
 }

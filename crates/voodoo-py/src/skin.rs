@@ -10,7 +10,7 @@ use voodoo_sensors::eye::Eye;
 use voodoo_sensors::skin::cue::{Expected, SkinCue, SkinInput, SkinSettings};
 use voodoo_sensors::skin::depth::DepthBeside;
 
-use crate::arrays::{DepthView, Row, contiguous, vectors};
+use crate::arrays::{DEPTH_ARRAY, DepthView, Row, contiguous, vectors};
 use crate::camera::{affine, camera_of};
 use crate::errors::{raise, wrong_argument};
 use crate::people::TrackedBody;
@@ -91,9 +91,8 @@ impl PySkinCue {
             predicted.call_method0("keys")?.try_iter()?.map(|name| name?.extract()).collect::<PyResult<_>>()?;
         let joints: Vec<Vec3> = places_of(predicted, &names)?.into_iter().flatten().collect();
         let depth = depth.map(|(image, per_unit, camera, pose)| {
-            let expected = "an array of shape (height, width) and dtype uint16 or float32";
             let view = contiguous(&image).and_then(|array| array.extract::<DepthView>());
-            let view = view.map_err(|_| wrong_argument("depth", expected, &image))?;
+            let view = view.map_err(|_| wrong_argument("depth", DEPTH_ARRAY, &image))?;
             Ok::<_, PyErr>((view, per_unit, camera_of(&camera)?, affine("world_from_depth", &pose)?))
         });
         let depth = depth.transpose()?;

@@ -46,6 +46,11 @@ pub fn refill<T>(values: &mut Vec<T>, others: impl IntoIterator<Item = T>) {
     values.extend(others);
 }
 
+/// The probability of an event with these log odds.
+pub fn probability(log_odds: f64) -> f64 {
+    1.0 / (1.0 + (-log_odds).exp())
+}
+
 /// The dot product of two rows.
 pub fn dot(left: &[f64], right: &[f64]) -> f64 {
     left.iter().zip(right).map(|(left, right)| left * right).sum()

@@ -5,7 +5,7 @@
 //! become right. Then the evidence of the frame is added. A single frame therefore changes little after a run of confident
 //! frames, and much after a fast motion.
 
-use crate::math::Vec3;
+use crate::math::{Vec3, probability};
 use crate::tracker::estimate::LimbStatus;
 use crate::visibility::LITTLE;
 
@@ -94,11 +94,6 @@ pub(super) fn any_log_odds(one: f64, other: f64) -> f64 {
 /// Limit of the evidence: the log odds that a limb at rest did not change.
 fn max_log_odds() -> f64 {
     ((1.0 - CHANGES) / CHANGES).ln()
-}
-
-/// Returns the probability of an event with these log odds.
-pub(super) fn probability(log_odds: f64) -> f64 {
-    1.0 / (1.0 + (-log_odds).exp())
 }
 
 #[cfg(test)]

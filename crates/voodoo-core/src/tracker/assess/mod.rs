@@ -23,14 +23,14 @@ use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Model};
 use crate::detect::Detected;
 use crate::fit::Context;
-use crate::math::{Pose, Vec3, refill, reset};
+use crate::math::{Pose, Vec3, probability, refill, reset};
 use crate::terms::APART;
 use crate::uncertainty::EdgeFilter;
 use crate::visibility::limb_support::{LimbSupport, measure_support};
 use crate::visibility::render::LimbRaycaster;
 use crate::visibility::{EXPLAINED, FEW, LITTLE};
 use exclusive::Exclusive;
-use limb_filter::{EVEN, LimbFilter, all_log_odds, any_log_odds, is_uncertain, probability, support_log_odds};
+use limb_filter::{EVEN, LimbFilter, all_log_odds, any_log_odds, is_uncertain, support_log_odds};
 
 /// Weight of past frames in the sums of the roundness: a single blurred frame must not make the body flat.
 const ROUNDNESS_MEMORY: f64 = 0.9;
